@@ -26,7 +26,7 @@ from . import plan_files, sources
 from .algorithm import path_of
 from .engine import EngineError
 from .jobs import Live
-from .keys import Keys
+from .keys import REDO, UNDO, Keys, written
 from .map_tools import BorrowedMap, CircleTool, PointTool, band
 from .preview import Preview
 from .review import OPEN, Review, by_doubt, value
@@ -86,22 +86,18 @@ class ReviewDock(QDockWidget):
             ("move", tr("Move: click its middle"), "M", self.begin_move),
             ("draw", tr("Draw: drag a circle"), "D", self.begin_draw),
             ("undo", tr("Undo"), "U", self.undo),
+            ("redo", tr("Redo"), REDO, self.redo),
             ("save", tr("Save and plan again"), "S", self.save),
         )
         for number, (name, text, key, action) in enumerate(rows):
-            button = QPushButton(f"{text}  ({key})" if key else text)
+            button = QPushButton(f"{text}  ({written(key)})" if key else text)
             button.clicked.connect(action)
             self.buttons[name] = button
-            if name == "open":
-                grid.addWidget(button, 0, 0, 1, 2)
-            else:
-                grid.addWidget(button, (number + 1) // 2, (number + 1) % 2)
-        self._keys = Keys(
-            self,
-            self.canvas,
-            {key: action for *_, key, action in rows if key},
-            lambda: self.isVisible() and self._ready,
-        )
+            wide = 2 if name in ("open", "save") else 1
+            grid.addWidget(button, (number + 1) // 2, (number + 1) % 2, 1, wide)
+        actions = {key: action for *_, key, action in rows if key}
+        actions[UNDO] = self.undo
+        self._keys = Keys(self, self.canvas, actions, self._is_ours)
         box.addLayout(grid)
         box.addStretch(1)
         self.setWidget(body)
@@ -112,6 +108,12 @@ class ReviewDock(QDockWidget):
         """Whether an edit would reach the plan: while its file is written, no layer holds it."""
         return self.review is not None and self._released is None
 
+    def _is_ours(self, key: str) -> bool:
+        """Whether a key is the panel's now; QGIS's own are those of an active layer in editing."""
+        active = self.iface.activeLayer()
+        theirs = key in (UNDO, REDO) and isinstance(active, QgsVectorLayer) and active.isEditable()
+        return self.isVisible() and self._ready and not theirs
+
     def _tell(self) -> None:
         """What the panel says of the plan as it is now."""
         layer = self.review.layer if self._ready else None
@@ -119,6 +121,7 @@ class ReviewDock(QDockWidget):
             button.setEnabled(layer is not None and (name in _OF_PLAN or self.current is not None))
         self.buttons["open"].setEnabled(self._released is None)
         self.buttons["undo"].setEnabled(layer is not None and layer.undoStack().canUndo())
+        self.buttons["redo"].setEnabled(layer is not None and layer.undoStack().canRedo())
         unsaved = layer is not None and layer.isModified()
         self.setWindowTitle(tr("Review of a field") + (" *" if unsaved else ""))
         self.labels.tell(
@@ -241,9 +244,15 @@ class ReviewDock(QDockWidget):
 
     def undo(self) -> None:
         """Take the last edit back; it is the layer's own undo."""
-        if self.review is None:
-            return
-        changed = self.review.undo()
+        if self.review is not None:
+            self._show_changed(self.review.undo())
+
+    def redo(self) -> None:
+        """Make the edit again that was taken back last; it is the layer's own redo."""
+        if self.review is not None:
+            self._show_changed(self.review.redo())
+
+    def _show_changed(self, changed: list[int]) -> None:
         if len(changed) == 1:  # seen, and what the next key speaks of
             self._go(changed[0])
         self._show_mark()

@@ -6,7 +6,18 @@ from collections.abc import Mapping
 from typing import Any, Callable
 
 from qgis.PyQt.QtCore import QEvent, QObject, Qt
+from qgis.PyQt.QtGui import QKeySequence
 from qgis.PyQt.QtWidgets import QWidget
+
+#: QGIS's own keys for the layer that is active.
+UNDO, REDO = "undo", "redo"
+_STANDARD = {UNDO: QKeySequence.StandardKey.Undo, REDO: QKeySequence.StandardKey.Redo}
+
+
+def written(key: str) -> str:
+    """A key as it stands on a button, in the person's language."""
+    native = QKeySequence.SequenceFormat.NativeText
+    return QKeySequence(_STANDARD.get(key, key)).toString(native)
 
 
 class Keys(QObject):
@@ -20,9 +31,9 @@ class Keys(QObject):
     panel, canvas
         Where the keys work.
     actions : mapping
-        What each key does.
-    awake
-        Whether they do it now.
+        What each key does: a letter, a sign, `UNDO` or `REDO`.
+    is_ours
+        Whether a key does it now.
     """
 
     def __init__(
@@ -30,10 +41,10 @@ class Keys(QObject):
         panel: QWidget,
         canvas: QWidget,
         actions: Mapping[str, Callable[[], Any]],
-        awake: Callable[[], bool],
+        is_ours: Callable[[str], bool],
     ) -> None:
         super().__init__(panel)
-        self._places, self._actions, self._awake = (canvas, panel), actions, awake
+        self._places, self._actions, self._is_ours = (canvas, panel), actions, is_ours
         for place in self._places:
             place.installEventFilter(self)
 
@@ -45,8 +56,9 @@ class Keys(QObject):
     def eventFilter(self, watched: Any, event: Any) -> bool:
         """Take a key before QGIS does."""
         if event.type() in (QEvent.Type.ShortcutOverride, QEvent.Type.KeyPress):
-            action = self._actions.get(_pressed(event))
-            if action is not None and self._awake():
+            key = _pressed(event)
+            action = self._actions.get(key)
+            if action is not None and self._is_ours(key):
                 event.accept()
                 if event.type() == QEvent.Type.KeyPress:
                     action()
@@ -55,7 +67,10 @@ class Keys(QObject):
 
 
 def _pressed(event: Any) -> str:
-    """A key as it is written on a button; Shift makes some signs, and no letter another one."""
+    """The name of a key; Shift makes some signs, and no letter another one."""
+    for key, standard in _STANDARD.items():
+        if event.matches(standard):
+            return key
     text, held = event.text().upper(), event.modifiers() & ~Qt.KeyboardModifier.KeypadModifier
     if not text.isalpha():
         held &= ~Qt.KeyboardModifier.ShiftModifier

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Callable
 
 from qgis.core import NULL, QgsFeature, QgsGeometry, QgsPointXY, QgsVectorLayer
 from qgis.PyQt.QtGui import QTransform
@@ -112,17 +112,24 @@ class Review:
 
     def undo(self) -> list[int]:
         """Take the last edit back; the ids of the obstacles that are otherwise now."""
-        layer = self.layer
+        return self._changed_by(self.layer.undoStack().undo)
+
+    def redo(self) -> list[int]:
+        """Make the edit again that was taken back last; the ids as for :meth:`undo`."""
+        return self._changed_by(self.layer.undoStack().redo)
+
+    def _changed_by(self, act: Callable[[], None]) -> list[int]:
         changed: dict[int, None] = {}
 
         def note(feature_id: int, *_: Any) -> None:
             changed[feature_id] = None
 
+        layer = self.layer
         signals = (layer.attributeValueChanged, layer.geometryChanged, layer.featureAdded)
         for signal in signals:
             signal.connect(note)
         try:
-            layer.undoStack().undo()
+            act()
         finally:
             for signal in signals:
                 signal.disconnect(note)

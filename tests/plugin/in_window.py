@@ -121,6 +121,10 @@ def work():
     ANSWER["undone"] = [layer.getFeature(dock.current)["obstacle_no"], dock.windowTitle()]
     ANSWER["changed"] = sorted(no for no in before if before[no] != after[no])
     ANSWER["undo_steps"] = layer.undoStack().count()
+    # QGIS has the key, too: for the layer that is active, which is the picture.
+    key(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier)
+    ANSWER["redone"] = [statuses(layer)[ANSWER["third"]], dock.buttons["redo"].text()]
+    key(Qt.Key.Key_U)
     dock.step(1)
     number = layer.getFeature(dock.current)["obstacle_no"]
     radius = layer.getFeature(dock.current)["radius_m"]

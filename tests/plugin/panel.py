@@ -44,8 +44,10 @@ class Window:
     def messageBar(self):
         return self.bar
 
+    active = None
+
     def activeLayer(self):
-        return None
+        return self.active
 
     def said(self):
         """What a person reads in the messages."""
@@ -259,7 +261,40 @@ def undone(plan):
     layer.getFeatures = lambda *words: looked.append(words) or features(*words)
     for _ in range(5):
         found.append(review.undo())
-    return {"ids": [one, other, gone], "found": found, "looked": len(looked)}
+    again = [review.redo() for _ in range(5)]
+    return {"ids": [one, other, gone], "found": found, "again": again, "looked": len(looked)}
+
+
+def redone(plan):
+    """An edit taken back and made again by keys, after the panel took the plan over once more."""
+    layers, dock = reviewed(plan)
+    dock.show()
+    dock.open(plan)
+    settled(dock)
+    layer, first, said = layers["obstacles"], dock.current, dock.labels
+    control, shift = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftModifier
+
+    def seen():
+        settled(dock)
+        state = layer.getFeature(first)["status"], said.figures.text()
+        return [*state, *(dock.buttons[name].isEnabled() for name in ("undo", "redo"))]
+
+    found = {"opened": seen()}
+    dock.decide("rejected")
+    found["rejected"] = seen()
+    QTest.keyClick(window.canvas, "z", control)
+    found["undone"] = seen()
+    dock.open(plan)
+    dock.step(1)
+    window.active = layers["field"]
+    window.active.startEditing()
+    QTest.keyClick(window.canvas, "z", control | shift)
+    found["of_another"] = seen()
+    window.active.rollBack()
+    QTest.keyClick(window.canvas, "z", control | shift)
+    found["redone"] = seen()
+    found["at"] = [dock.current == first, dock.buttons["redo"].text()]
+    return found
 
 
 def routed(plan):
@@ -317,7 +352,7 @@ def clicks(picture, lon, lat, home):
 
 _ALL = (
     saved_with_edits, filtered, read_only, without_radius, project_saved_meanwhile, discarded,
-    tools, keys, undone, routed, clicks,
+    tools, keys, undone, redone, routed, clicks,
 )  # fmt: skip
 ACTIONS = {each.__name__: each for each in _ALL}
 

@@ -88,7 +88,21 @@ def test_undo_knows_what_it_took_back(panel, plan):
     seen = panel("undone", plan=plan)
     one, other, gone = seen["ids"]
     assert seen["found"] == [[], [gone], [other], [one], []]
+    (drawn,) = seen["again"][3]
+    assert seen["again"] == [[one], [other], [], [drawn], []]
     assert seen["looked"] == 0
+
+
+def test_what_was_taken_back_is_made_again_by_the_key_of_qgis(panel, plan):
+    seen = panel("redone", plan=plan)
+    status, before, *_ = seen["opened"]
+    after = seen["rejected"][1]
+    assert before != after
+    assert seen["rejected"] == ["rejected", after, True, False]
+    # Ctrl+Shift+Z is QGIS's own, where the active layer is in editing.
+    assert seen["undone"] == seen["of_another"] == [status, before, False, True]
+    assert seen["redone"] == ["rejected", after, True, False]
+    assert seen["at"] in ([True, "Redo  (Ctrl+Shift+Z)"], [True, "Redo  (Ctrl+Y)"])
 
 
 def test_the_route_before_the_edits_is_not_shown_until_they_are_saved(panel, plan, geofield):

@@ -101,7 +101,7 @@ def test_a_click_plans_the_field(seen):
     assert seen["outline_s"] < 60.0
 
 
-def test_keys_confirm_reject_and_undo(seen):
+def test_keys_confirm_reject_undo_and_redo(seen):
     assert seen["count_before"] == f"{len(seen['before'])} left to look at"
     assert sorted(seen["decided"].values()) == ["confirmed", "rejected"]
     # The third decision was undone by the layer's own undo.
@@ -109,6 +109,7 @@ def test_keys_confirm_reject_and_undo(seen):
     assert seen["undo_steps"] == 3
     # It is shown again, and the title says that something is not saved.
     assert seen["undone"] == [seen["third"], "Review of a field *"]
+    assert seen["redone"] == ["rejected", "Redo  (Ctrl+Shift+Z)"]
     assert seen["replan_s"] < 15.0  # one on a machine that has nothing else to do
 
 

@@ -230,6 +230,11 @@
     </message>
     <message>
       <location filename="dock.py" />
+      <source>Redo</source>
+      <translation>Wiederholen</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
       <source>Save and plan again</source>
       <translation>Speichern, neu planen</translation>
     </message>
