@@ -330,7 +330,7 @@ def run_obstacles(plan: Plan, scene: Scene, *, settings: Settings) -> Plan:
     )
 
 
-def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
+def run_tracks(plan: Plan, *, settings: Settings, with_route: bool = True) -> Plan:
     """Stage 4: plan the tracks in the free area of whatever field and obstacles there are."""
     field = replace(plan.field, method="drawn", quality=None) if plan.outline_edited else plan.field
     refuse_lost_obstacles(plan, searched=False)
@@ -342,7 +342,7 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
         told += [written.since(evidence.written)] if evidence.written is not None else []
         evidence = replace(evidence, written=written)
     read = replace(plan, field=field, obstacles=obstacles, tracks=None, evidence=evidence)
-    tracks = tracks_of_plan(read, settings)
+    tracks = tracks_of_plan(read, settings, with_route=with_route)
     evidence = replace(evidence, track_edits=tracks.edits).with_unsearched(field)
     warn_of_unsearched(evidence)
     told += [*tracks_come_back(plan), tracks.edits.in_words()]
@@ -359,9 +359,9 @@ def run_tracks(plan: Plan, *, settings: Settings) -> Plan:
     )
 
 
-def tracks_of_plan(plan: Plan, settings: Settings) -> Tracks:
+def tracks_of_plan(plan: Plan, settings: Settings, *, with_route: bool = False) -> Tracks:
     """The tracks alone, for field and obstacles as they stand in the plan."""
-    from geofield.tracks import plan_with_settings
+    from geofield.tracks import plan_with_settings, route_with_settings
 
     field = plan.field
     tracks = plan_with_settings(
@@ -378,7 +378,7 @@ def tracks_of_plan(plan: Plan, settings: Settings) -> Tracks:
             f"The field of {field.area_ha:.4f} ha is smaller than one track.",
             hint="Choose a smaller spacing or headland, or check the outline.",
         )
-    return tracks
+    return route_with_settings(tracks, settings.tracks, field.polygon) if with_route else tracks
 
 
 def _with_section(old: Settings | None, new: Settings, section: str) -> Settings:

@@ -175,10 +175,9 @@ class Desk:
         from geofield.plan_files import save_plan
 
         with self.lock:
-            step = self.session.step
             if target is not None:
                 # Whatever other programs do to the plan's own file, this one comes into being.
-                place = self._beside(target)
+                place, step = self._beside(target), self.session.whole()
                 with _in_words(place):
                     save_plan(step.plan, place, picture=self._picture_path)
                 self._elsewhere = step, place.name
@@ -190,6 +189,7 @@ class Desk:
                     "edits under another name (see More).",
                 )
             refuse_locked(self.path)
+            step = self.session.whole()
             with _in_words(self.path):
                 self.journal.before_saving()
                 save_plan(step.plan, self.path, read_from=self.path)
@@ -238,7 +238,7 @@ class Desk:
             tempfile.TemporaryDirectory(prefix="geofield-") as place,
             listening() as heard,
         ):
-            dataset = self.session.plan.to_dataset()
+            dataset = self.session.whole().plan.to_dataset()
             if self._picture_path is not None and chosen.pictured:
                 scene = picture_beside(self.path)
                 if scene != self._picture_path:

@@ -73,7 +73,7 @@ class FarmDesk(Desk):
                 )
             with tempfile.TemporaryDirectory(prefix="geofield-") as name:
                 whole = Path(name) / "field.gpkg"
-                save_plan(self.session.plan, whole)
+                save_plan(self.session.whole().plan, whole)
                 put_back(whole, self._folder, anyway=True)  # compared above
             self._put_back = True
             self._there = self._in_farm()

@@ -97,7 +97,7 @@ class Journal:
         begin = self._entries[0][1] if self._entries else 0
         for entry, end in self._entries[1:]:
             if "saved" in entry:
-                session.mark_saved(session.step)
+                session.mark_saved(session.whole())
                 unsaved, begin = 0, end
                 continue
             try:

@@ -28,6 +28,8 @@ class Step:
     command: Command | None = None
     #: What the planner had to tell.
     notes: tuple[str, ...] = ()
+    #: Whether the route that its settings want is not planned yet.
+    waits: bool = False
 
 
 class Session:
@@ -54,7 +56,7 @@ class Session:
         #: Whether what lies in the file was edited since its tracks were planned.
         self.outdated = plan.tracks is not None and not is_planned(plan)
         if plan.tracks is None or self.outdated:
-            first = planned(plan, None)
+            first = planned(plan, None, with_route=not self.outdated)
         self._steps = [first]
         self._at = 0
         self._saved: Step | None = None if self.outdated else first
@@ -85,14 +87,18 @@ class Session:
         return self._at + 1 < len(self._steps)
 
     def do(self, command: Command) -> Step:
-        """Make an edit and plan the tracks again.
+        """Make an edit and plan the tracks again; the route only where the edit names one.
+
+        Planning it takes seconds where obstacles are many: it waits for :meth:`whole`.
 
         Raises
         ------
         GeofieldError
             When the edit or the tracks after it are refused; nothing has changed then.
         """
-        step = planned(self._edited(command), command)
+        edited = self._edited(command)
+        asked = command["do"] == "tracks" and "route" in command["settings"]
+        step = planned(edited, command, with_route=asked)
         self._steps = [*self._steps[: self._at + 1], step][-MOST_STEPS:]
         self._at = len(self._steps) - 1
         return step
@@ -124,6 +130,18 @@ class Session:
         self._at = min(self._at + 1, len(self._steps) - 1)
         return self.step
 
+    def whole(self) -> Step:
+        """The state that is shown, with its route: what is written."""
+        from geofield.tracks import route_with_settings
+
+        plan = self.plan
+        if self.step.waits and plan.tracks is not None and plan.settings is not None:
+            with listening():  # the tracks tell it
+                tracks = route_with_settings(plan.tracks, plan.settings.tracks, plan.field.polygon)
+            whole = replace(self.step, plan=replace(plan, tracks=tracks), waits=False)
+            self._steps[self._at] = whole
+        return self.step
+
     def mark_saved(self, step: Step) -> None:
         """Know that this state lies in the file now; what led to it can still be undone."""
         self._saved = step
@@ -136,12 +154,10 @@ class Session:
 def planned(plan: Plan, command: Mapping[str, Any] | None, *, with_route: bool = True) -> Step:
     """A plan with the tracks that follow from its field, obstacles and settings."""
     settings = plan.settings or Settings()
-    if not with_route:
-        tracks = settings.tracks.model_copy(update={"route": "none"})
-        settings = settings.model_copy(update={"tracks": tracks})
     with listening() as heard:
-        after = run_tracks(plan, settings=settings)
+        after = run_tracks(plan, settings=settings, with_route=with_route)
     known = () if after.tracks is None else after.tracks.notes
     notes = [each for each in dict.fromkeys(map(str, heard)) if each not in known]
     kept = after.evidence.track_edits.in_words()
-    return Step(after, command, (*notes, kept) if kept else tuple(notes))
+    waits = not with_route and settings.tracks.route != "none"
+    return Step(after, command, (*notes, kept) if kept else tuple(notes), waits)

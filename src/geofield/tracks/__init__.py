@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from geofield.late import late_names
 from geofield.tracks.direction import find_baseline
-from geofield.tracks.from_settings import plan_with_settings
+from geofield.tracks.from_settings import plan_with_settings, route_with_settings
 from geofield.tracks.longest_edge import StraightRun, longest_edge
 from geofield.tracks.planner import plan_tracks
 
@@ -20,6 +20,7 @@ __all__ = [
     "plan_route",
     "plan_tracks",
     "plan_with_settings",
+    "route_with_settings",
 ]
 
 # Most runs need no route.

@@ -43,7 +43,7 @@ def plan_with_settings(
     outside: Sequence[LineString] | None = None,
     edits: TrackEdits | None = None,
 ) -> Tracks:
-    """Plan tracks and, when `settings.route` names a pattern, the route through them.
+    """Plan tracks; the route through them is :func:`route_with_settings`.
 
     Parameters
     ----------
@@ -76,16 +76,21 @@ def plan_with_settings(
     told = _reaching_in(settings, obstacles)
     for note in told:
         warn(note, TrackWarning, stacklevel=2)
-    tracks = replaced(tracks, notes=(*tracks.notes, *told))
+    return replaced(tracks, notes=(*tracks.notes, *told))
+
+
+def route_with_settings(tracks: Tracks, settings: TrackSettings, polygon: Polygon) -> Tracks:
+    """The tracks in a field with a route, when `settings.route` names a pattern."""
     if settings.route == "none":
         return tracks
     from geofield.tracks.route import plan_route
 
+    start = settings.start_lonlat
     return plan_route(
         tracks,
         pattern=settings.route,
         **{name: getattr(settings, name) for name in _OF_ROUTE},
-        start=place(settings.start_lonlat, "start"),
+        start=None if start is None else _place(start, tracks.crs, polygon, "start"),
     )
 
 
