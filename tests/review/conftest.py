@@ -6,7 +6,9 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import geopandas as gpd
 import pytest
+from shapely import LineString
 
 from geofield.model import Alternative
 from geofield.plan import read_plan
@@ -42,4 +44,17 @@ def doubtful_path(plan_path: Path) -> Path:
     narrower = Alternative(own.polygon.buffer(-20.0), 0.01)
     field = replace(plan.field, alternatives=(own, narrower))
     save_plan(replace(plan, field=field), plan_path, read_from=plan_path)
+    return plan_path
+
+
+@pytest.fixture
+def bent_path(plan_path: Path) -> Path:
+    """The plan, with its longest track bent by hand, 3 m to its side at the middle."""
+    segments = gpd.read_file(plan_path, layer="segments")
+    row = segments.length.idxmax()
+    (x0, y0), (x1, y1) = segments.geometry[row].coords
+    aside = 3.0 / segments.geometry[row].length
+    middle = (x0 + x1) / 2 + (y1 - y0) * aside, (y0 + y1) / 2 - (x1 - x0) * aside
+    segments.loc[row, "geometry"] = LineString([(x0, y0), middle, (x1, y1)])
+    segments.to_file(plan_path, layer="segments", driver="GPKG", geometry_name="geom")
     return plan_path

@@ -111,7 +111,7 @@ def test_drawing_moving_and_resizing_with_the_pointer(page: Page) -> None:
     assert added["radius_m"] == pytest.approx(6.0, abs=0.6)
     assert added["centre"] == pytest.approx([x, y], abs=0.6)
     # Tracks keep away from it as soon as it is there.
-    for _, x0, y0, x1, y1 in page.state()["tracks"]:
+    for _, ((x0, y0), (x1, y1)) in page.state()["tracks"]:
         away = (
             abs((y1 - y0) * (x - x0) - (x1 - x0) * (y - y0))
             / ((x1 - x0) ** 2 + (y1 - y0) ** 2) ** 0.5
@@ -618,6 +618,37 @@ def test_notes_of_tracks_are_in_german(page: Page) -> None:
     )
     assert [text for text in told if text in notes] == []
     assert "Wege zwischen Abschnitten" in " ".join(told)
+
+
+def test_a_track_that_a_person_bent_is_shown_as_it_is(
+    driver: webdriver.Chrome, bent_path: Path
+) -> None:
+    """Of its places the two ends were shown, and the arrow of the drive beside it."""
+    shown = (
+        "const [done] = arguments; import('/map.js').then(({sources}) =>"
+        " done(sources.tracks.getFeatures().map(one => one.getGeometry().getCoordinates())));"
+    )
+    with served(bent_path) as (address, _):
+        page = Page(driver, address)
+        (bent,) = [xy for xy in driver.execute_async_script(shown) if len(xy) > 2]
+        page.run("document.querySelector('[name=route]').value = 'boustrophedon'")
+        page.driver.find_element(By.CSS_SELECTOR, "#settings [type=submit]").click()
+        page.wait(lambda: page.state()["drive"])
+        arrows = [shapely.Point(xy) for *xy, _ in page.state()["drive"]]
+        assert shapely.LineString(bent).distance(shapely.MultiPoint(arrows)) < 0.002
+        page.click(*page.obstacle(8)["centre"])
+        half_drag(page, page.pixel(*page.obstacle(8)["centre"]))
+        # What follows a hand is one shape.
+        page.wait(lambda: bent in driver.execute_async_script(shown)[0])
+        ActionChains(driver).release().perform()
+        page.wait(lambda: page.state()["can_undo"] and page.obstacle(8)["status"] == "confirmed")
+        page.button("save")
+        page.wait(lambda: "Saved" in page.text("message"))
+        assert bent in driver.execute_async_script(shown)
+    tracks = read_plan(bent_path).tracks
+    assert tracks is not None
+    (saved,) = [one for one in tracks.segments.geometry if len(one.coords) > 2]
+    assert saved.equals_exact(shapely.LineString(bent), 0.001)
 
 
 def test_a_second_tab_is_told_and_can_take_over(page: Page) -> None:

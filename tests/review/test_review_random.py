@@ -24,11 +24,11 @@ import('/map.js').then(({sources}) => {
     obstacles: drawn('obstacles').map(one => [one.getId(), one.get('status'), shape(one)]),
     listed: [...document.querySelectorAll('#list button')].map(one => Number(one.dataset.no)),
     outline: drawn('outline').map(shape)[0],
-    tracks: drawn('tracks').map(one => [one.get('no'), ...one.getGeometry().getCoordinates().flat()]),
+    tracks: drawn('tracks').map(one => [one.get('no'), one.getGeometry().getCoordinates()]),
     notes: id('notes').childElementCount, undo: !id('undo').disabled, redo: !id('redo').disabled,
   });
 });
-"""  # noqa: E501
+"""
 RESTS = "return !document.body.matches('.busy') && performance.now() - (window.heard ?? 0) > 250"
 #: Tells when the last answer came.
 LISTEN = """

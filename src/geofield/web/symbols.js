@@ -65,8 +65,8 @@ export const outlineColor = field => field.certainty !== null && field.doubts.le
 export const line = (xy, values = {}) => new ol.Feature({geometry: new ol.geom.LineString(xy), ...values});
 export const closed = rings => new ol.geom.Polygon(rings.map(ring => [...ring, ring[0]]));
 
-export const trackFeatures = rows => rows.map(([no, x0, y0, x1, y1]) => line([[x0, y0], [x1, y1]], {no}));
-export const gapFeatures = rows => rows.map(([x0, y0, x1, y1, cause]) => line([[x0, y0], [x1, y1]], {cause}));
+export const trackFeatures = rows => rows.map(([no, xy]) => line(xy, {no}));
+export const gapFeatures = rows => rows.map(([xy, cause]) => line(xy, {cause}));
 
 export const driveFeatures = rows => rows.map(([x, y, turned], i) =>
   new ol.Feature({geometry: new ol.geom.Point([x, y]), turned, order: i + 1}));

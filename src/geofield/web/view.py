@@ -41,17 +41,17 @@ def tracks_view(tracks: Tracks | None, area_ha: float, notes: Sequence[str] = ()
     numbers = tracks.segments["track_no"].to_numpy(dtype=np.int64).tolist()
     gaps, around, turns = tracks.gaps, tracks.headland_tracks, tracks.turns
     return {
-        "tracks": [[no, *end] for no, end in zip(numbers, ends_of(tracks.segments), strict=True)],
+        "tracks": list(zip(numbers, lines_of(tracks.segments.geometry), strict=True)),
         "gaps": [
-            [*end, "" if cause is None else str(cause)]
-            for end, cause in zip(ends_of(gaps), gaps["cause"], strict=True)
+            (line, "" if cause is None else str(cause))
+            for line, cause in zip(lines_of(gaps.geometry), gaps["cause"], strict=True)
         ],
-        "headland": [] if around is None else lines_of(around.geometry.to_numpy()),
+        "headland": [] if around is None else lines_of(around.geometry),
         "route": []
         if turns is None
         else [
             {"line": line, "fits": fits != "no"}
-            for line, fits in zip(lines_of(turns.geometry.to_numpy()), turns["fits"], strict=True)
+            for line, fits in zip(lines_of(turns.geometry), turns["fits"], strict=True)
         ],
         "drive": [] if tracks.route is None else _drive(tracks.route),
         "figures": _figures(tracks, area_ha),
@@ -136,10 +136,12 @@ def margin_bounds(polygon: shapely.Polygon) -> tuple[float, float, float, float]
 def _drive(route: gpd.GeoDataFrame) -> list[list[float]]:
     """Where and which way segments are driven, in order: x, y and the turn from east, radians."""
     work = route[route["kind"] == "work"].geometry.to_numpy()
-    ends = shapely.get_coordinates([shapely.get_point(work, 0), shapely.get_point(work, -1)])
-    start, end = ends.reshape(2, -1, 2)
-    ahead = end - start
-    middle = np.round((start + end) / 2, _DIGITS)
+    # A person may have bent one: its middle lies on it.
+    behind, middle, before = (
+        shapely.get_coordinates(shapely.line_interpolate_point(work, share, normalized=True))
+        for share in (0.499, 0.5, 0.501)
+    )
+    ahead, middle = before - behind, np.round(middle, _DIGITS)
     turned = np.round(np.arctan2(ahead[:, 1], ahead[:, 0]), 4)
     arrows: list[list[float]] = np.column_stack([middle, turned]).tolist()
     return arrows
@@ -159,15 +161,6 @@ def _figures(tracks: Tracks, area_ha: float) -> dict[str, Any]:
         "turns": None if turns is None else len(turns),
         "turns_that_do_not_fit": None if turns is None else int((turns["fits"] == "no").sum()),
     }
-
-
-def ends_of(lines: gpd.GeoDataFrame) -> list[list[float]]:
-    """First and last place of each line: x0, y0, x1, y1."""
-    shapes = lines.geometry.to_numpy()
-    ends = [shapely.get_coordinates(shapely.get_point(shapes, at)) for at in (0, -1)]
-    xy = np.hstack(ends)
-    rounded: list[list[float]] = np.round(xy, _DIGITS).tolist()
-    return rounded
 
 
 def lines_of(lines: Any) -> list[list[list[float]]]:

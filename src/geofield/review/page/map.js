@@ -78,15 +78,14 @@ function fill(name, features) {
 
 // While they follow a hand, tracks are one shape: drawn many times faster than hundreds with numbers.
 export function showTracks(answer, moving = false) {
-  fill("tracks", moving ? together(ends(answer.tracks.map(row => row.slice(1)))) : symbols.trackFeatures(answer.tracks));
-  fill("gaps", together(ends(answer.gaps)));
+  fill("tracks", moving ? together(answer.tracks.map(([, xy]) => xy)) : symbols.trackFeatures(answer.tracks));
+  fill("gaps", together(answer.gaps.map(([xy]) => xy)));
   fill("headland", together(answer.headland));
   fill("drive", symbols.driveFeatures(answer.drive));
   for (const fits of [true, false])
     fill(fits ? "turns" : "unfit", together(answer.route.filter(turn => turn.fits === fits).map(turn => turn.line), {fits}));
 }
 
-const ends = rows => rows.map(([x0, y0, x1, y1]) => [[x0, y0], [x1, y1]]);
 const together = (lines, values = {}) =>
   lines.length ? [new ol.Feature({geometry: new ol.geom.MultiLineString(lines), ...values})] : [];
 
