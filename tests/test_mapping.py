@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 from PIL import Image
 from shapely import box
 
@@ -60,6 +61,29 @@ def test_outline_and_circles_lie_where_the_grid_says(plan: Plan, simulated: Simu
     # Rejected ones are dashed; all others closed.
     assert hits[0] > 0.5
     assert min(hits[1:]) > 0.9
+
+
+def test_circles_that_nothing_drives_around_are_dashed(
+    plan: Plan, simulated: SimulatedField
+) -> None:
+    """Dashes began anew at each corner of a circle, before the gap: 0.89 of it was drawn."""
+    assert plan.obstacles is not None
+    status = ["rejected", "possible", *["detected"] * (len(plan.obstacles) - 2)]
+    changed = replace(plan, obstacles=plan.obstacles.assign(status=status), tracks=None)
+    grid = simulated.scene.grid
+    scale = 1400 / max(grid.width_px, grid.height_px)
+    picture = np.asarray(draw_map(changed.to_dataset(), simulated.scene)).astype(int)
+    shares = []
+    for shape, name in zip(plan.obstacles.geometry, status, strict=True):
+        ring = shapely.line_interpolate_point(shape.exterior, np.arange(400) / 400, normalized=True)
+        xy = shapely.get_coordinates(ring)
+        x, y = grid.from_crs(xy[:, 0], xy[:, 1], plan.field.crs)
+        columns, rows = (np.floor(each * scale).astype(int) for each in (x, y))
+        off = np.abs(picture[rows, columns] - theme.rgb(theme.STATUS[name].color)).max(axis=1)
+        shares.append((off < 40).mean())
+    assert shares[0] < 0.6
+    assert shares[1] < 0.3
+    assert min(shares[2:]) > 0.65
 
 
 def test_the_map_is_the_same_twice_and_needs_no_picture(

@@ -187,14 +187,15 @@ def _outlined(
 
 
 def dashes(points: NDArray[np.float64], on: float, off: float) -> list[list[float]]:
-    """The drawn pieces of a dashed line through points, each x, y, x, y."""
-    pieces: list[list[float]] = []
-    for a, b in itertools.pairwise(points):
-        length = float(np.hypot(*(b - a)))
-        if length == 0:
-            continue
-        starts = np.arange(0.0, length, on + off)
-        ends = np.minimum(starts + on, length)
-        direction = (b - a) / length
-        pieces += np.hstack([a + at[:, None] * direction for at in (starts, ends)]).tolist()
-    return pieces
+    """The drawn pieces of a dashed line through points, each x, y, x, y: they go round corners."""
+    along = np.concatenate([[0.0], np.hypot(*np.diff(points, axis=0).T).cumsum()])
+    starts = np.arange(0.0, along[-1], on + off)
+    ends = np.minimum(starts + on, along[-1])
+    tips = [
+        np.column_stack([np.interp(at, along, axis) for axis in points.T]) for at in (starts, ends)
+    ]
+    first, last = np.searchsorted(along, starts, side="right"), np.searchsorted(along, ends)
+    return [
+        np.vstack([a, points[i:j], b]).ravel().tolist()
+        for a, b, i, j in zip(*tips, first, last, strict=True)
+    ]
