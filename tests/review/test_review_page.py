@@ -373,6 +373,7 @@ def test_an_empty_plan_has_no_dead_buttons_and_a_telephone_shows_the_whole_field
     try:
         with served(plan_path) as (address, _):
             page = Page(driver, address)
+            assert page.text("left") == "None found"
             dead = [
                 name
                 for name in ("previous", "next", "confirm", "reject")
@@ -938,6 +939,42 @@ def test_a_key_held_down_judges_once_and_a_slider_has_its_arrows(page: Page) -> 
     page.press("u")  # comes after whatever the arrows did
     page.wait(lambda: float(slider.get_attribute("value") or 1) == pytest.approx(0.9))
     assert page.judged() == 1
+
+
+def test_a_key_held_down_ends_with_the_hand(page: Page) -> None:
+    """With 300 obstacles a tree went on for 18 s after an arrow had been held for 2 s."""
+    (x, y), seen = page.obstacle(8)["centre"], page.state()["stamp"]
+    page.run("document.querySelector('#list [data-no=\"8\"]').click()")
+    held = (
+        "for (const repeat of [arguments[0], true, true, true]) window.dispatchEvent("
+        "new KeyboardEvent('keydown', {key: 'ArrowLeft', repeat, bubbles: true}));"
+    )
+    for steps in (1, 2):
+        page.run(held, steps == 2)
+        page.wait(lambda seen=seen: page.state()["stamp"] != seen)
+        time.sleep(0.5)
+        seen = page.state()["stamp"]
+        assert page.obstacle(8)["centre"] == pytest.approx([x - 0.5 * steps, y], abs=0.01)
+
+
+def test_a_hand_that_trembles_moves_nothing_by_a_click(page: Page) -> None:
+    """A click beside the middle of the square made the tree larger, and confirmed it."""
+    page.run("document.querySelector('#list [data-no=\"8\"]').click()")
+    time.sleep(0.3)
+    before, (_, metre) = page.obstacle(8), page.view()
+    x, y = before["centre"]
+    corner = x + before["radius_m"] + before["buffer_m"] + 5 * metre
+    for spot in (x, corner):
+        page.drag((spot, y), (spot + 2.4 * metre, y), steps=1)
+        time.sleep(0.4)
+        assert (page.obstacle(8), page.state()["can_undo"]) == (before, False)
+    page.drag((corner, y), (corner + 30 * metre, y))
+    page.wait(lambda: page.state()["can_undo"])
+    wider = page.obstacle(8)["radius_m"] - before["radius_m"]
+    assert wider == pytest.approx(30 * metre, abs=1.5 * metre)
+    page.drag((x, y), (x + 9.4 * metre, y), steps=3)
+    page.wait(lambda: page.obstacle(8)["centre"] != before["centre"])
+    assert page.obstacle(8)["centre"] == pytest.approx([x + 9 * metre, y], abs=metre)
 
 
 def test_a_hole_goes_whole_and_a_word_taken_back_leaves_what_was_found(

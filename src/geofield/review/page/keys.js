@@ -20,30 +20,31 @@ export function listen(actions) {
   // Captured before the map sees them: the map pans by arrows where no obstacle is chosen.
   window.addEventListener("keydown", event => {
     const control = event.ctrlKey || event.metaKey, key = event.key;
-    if (control && key.toLowerCase() === "s") return done(event, actions.save);
+    // What is held goes on when the last answer is there, and ends with the hand.
+    const waits = event.repeat && actions.busy();
+    const done = work => {
+      event.preventDefault();
+      event.stopPropagation();
+      if (!waits) work?.();
+    };
+    if (control && key.toLowerCase() === "s") return done(actions.save);
     const typing = event.target.matches?.("input:not([type=checkbox]):not([type=range]), select, textarea");
     if (typing || document.querySelector("dialog[open]")) return;
-    if (control && key.toLowerCase() === "z") return done(event, event.shiftKey ? actions.redo : actions.undo);
-    if (control && key.toLowerCase() === "y") return done(event, actions.redo);
+    if (control && key.toLowerCase() === "z") return done(event.shiftKey ? actions.redo : actions.undo);
+    if (control && key.toLowerCase() === "y") return done(actions.redo);
     if (control || (event.altKey && !BRACKETS.includes(key))) return;
     if (!document.getElementById("keys-on").checked && key !== "Escape") return;
     if (key in ARROWS) {
       if (event.target.matches?.("input[type=range]")) return;
       const metres = event.shiftKey ? 0.1 : 0.5, [x, y] = ARROWS[key];
-      if (actions.nudge(x * metres, y * metres) !== false) done(event, () => {});
+      if (waits || actions.nudge(x * metres, y * metres) !== false) done();
       return;
     }
     // Buttons and lists have their own use for it.
     if (key === "Enter" && event.target.id !== "map") return;
     const found = KEYS.find(([name]) => name === key || (name.length === 1 && name === key.toLowerCase()));
-    if (found) done(event, () => (event.repeat && !ON_AND_ON.includes(found[0])) || found[2](actions));
+    if (found) done(() => (event.repeat && !ON_AND_ON.includes(found[0])) || found[2](actions));
   }, true);
-}
-
-function done(event, work) {
-  event.preventDefault();
-  event.stopPropagation();
-  work();
 }
 
 export function keyTable(table) {

@@ -315,7 +315,7 @@ const ACTIONS = {
   reset: () => inTurn(takeBack), undo: () => through("undo"), redo: () => through("redo"), save: () => save(),
   help: () => $("keys").showModal(), more: () => $("menu").showModal(), smaller: () => inTurn(() => resize(1 / 1.1)), larger: () => inTurn(() => resize(1.1)),
   remove: () => tools.removeCorner() || ifChosen(no => make({do: "delete", no})), tool: name => { tools.use(name); speak(t(`t_${name}`)); }, here: tools.addHere, nudge,
-  onward: () => goTo((state.plan + 1) % state.plans.length),
+  busy: () => undone > 0, onward: () => goTo((state.plan + 1) % state.plans.length),
   escape: () => { if (tools.current() === "select") inTurn(() => choose(null)); tools.use("select"); },
 };
 

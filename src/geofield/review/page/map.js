@@ -37,7 +37,8 @@ export function build(state, chosen) {
   add("sketch", symbols.cased(state.theme.outline, 2, [6, 6]));
   // The page is the map: it moves whatever has the focus.
   const interactions = ol.interaction.defaults.defaults({onFocusOnly: false, altShiftDragRotate: false, pinchRotate: false});
-  map = new ol.Map({target: "map", layers, view, interactions, controls: ol.control.defaults.defaults({rotate: false, attribution: false})
+  // A hand that trembles while it clicks moves nothing.
+  map = new ol.Map({target: "map", moveTolerance: 4, layers, view, interactions, controls: ol.control.defaults.defaults({rotate: false, attribution: false})
     .extend([new ol.control.ScaleLine({minWidth: 90})]), keyboardEventTarget: document.getElementById("map")});
   // The scale bar knows no CRS of its own making: true metres on the ground come from the server.
   ol.proj.addProjection(projection);

@@ -167,19 +167,19 @@ function mover() {
     hitTolerance: reach,
   });
   // What the hand took is moved, whatever a key makes the chosen one meanwhile.
-  let from = null, no = null;
+  let from = null, no = null, dragged = false;
   const command = event => ({do: "move", no, dx_m: at(event.coordinate)[0] - from[0], dy_m: at(event.coordinate)[1] - from[1]});
   translate.on("translatestart", event => {
     from = at(event.startCoordinate ?? event.coordinate);
     no = desk.chosen();
+    dragged = false;
     maps.sources.handle.clear();
   });
-  translate.on("translating", event => live(command(event)));
-  translate.on("translateend", event => {
-    const final = command(event);
-    if (Math.hypot(final.dx_m, final.dy_m) > 0) commit(final);
-    else desk.again();
+  translate.on("translating", event => {
+    dragged = true;
+    live(command(event));
   });
+  translate.on("translateend", event => dragged ? commit(command(event)) : desk.again());
   return translate;
 }
 
@@ -187,19 +187,23 @@ function resizer() {
   const translate = new ol.interaction.Translate({
     layers: layer => layer.getSource() === maps.sources.handle, hitTolerance: reach,
   });
-  let row = null;
-  const command = event => {
-    const [x, y] = row.centre;
-    const away = Math.hypot(event.coordinate[0] - x, event.coordinate[1] - y);
-    return {do: "radius", no: row.no, radius_m: Math.max(0.3, Math.round((away * desk.scale() - row.buffer_m) * 1000) / 1000)};
-  };
-  translate.on("translatestart", () => { row = desk.row(desk.chosen()); });
+  // Wherever the hand took the square, its way counts.
+  let row = null, grip = 0, dragged = false;
+  const away = ([x, y]) => Math.hypot(x - row.centre[0], y - row.centre[1]);
+  const command = ({coordinate}) => ({do: "radius", no: row.no,
+    radius_m: Math.max(0.3, Math.round((row.radius_m + (away(coordinate) - grip) * desk.scale()) * 1000) / 1000)});
+  translate.on("translatestart", ({coordinate}) => {
+    row = desk.row(desk.chosen());
+    grip = away(coordinate);
+    dragged = false;
+  });
   translate.on("translating", event => {
+    dragged = true;
     const wanted = command(event);
     maps.sources.obstacles.getFeatureById(row.no)?.setGeometry(
       ol.geom.Polygon.fromCircle(new ol.geom.Circle(row.centre, wanted.radius_m + row.buffer_m), 64));
     live(wanted);
   });
-  translate.on("translateend", event => commit(command(event)));
+  translate.on("translateend", event => dragged ? commit(command(event)) : desk.again());
   return translate;
 }
