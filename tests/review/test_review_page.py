@@ -28,6 +28,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from geofield.errors import TrackError, TrackWarning
+from geofield.model.evidence import Evidence
 from geofield.notes import listening
 from geofield.plan import read_plan
 from geofield.plan_files import save_plan
@@ -386,6 +387,11 @@ def test_an_empty_plan_has_no_dead_buttons_and_a_telephone_shows_the_whole_field
                 " sources.outline.getExtent())));"
             )
             assert seen
+        # Nobody searched here: that is another thing than to find nothing.
+        unsearched = replace(read_plan(plan_path), evidence=Evidence())
+        save_plan(unsearched, plan_path, read_from=plan_path)
+        with served(plan_path) as (address, _):
+            assert Page(driver, address).text("left") == "Nobody searched for any"
     finally:
         driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 

@@ -164,7 +164,7 @@ function ordered() {
 
 function showList() {
   const all = state.obstacles.length, left = state.obstacles.filter(waits).length;
-  $("left").textContent = !all ? t("no_obstacles") : left ? t("left", {n: left, all}) : t("none_left", {all});
+  $("left").textContent = !all ? t(state.detected_from === null ? "unsearched" : "no_obstacles") : left ? t("left", {n: left, all}) : t("none_left", {all});
   const focused = document.activeElement?.dataset?.no;
   $("list").replaceChildren(...ordered().map(each => {
     const item = document.createElement("li"), press = document.createElement("button");
