@@ -707,3 +707,20 @@ def test_edits_wait_for_no_route_and_what_is_written_has_it(
     assert mine == planned(mine, None).plan
     assert mine.settings is not None
     assert (mine.settings.tracks.route, mine.evidence.said_tracks) == ("boustrophedon", ("route",))
+
+
+def test_what_lies_in_the_file_is_not_written_again(plan_path: Path) -> None:
+    """The earlier plan, which `geofield undo` brings back, gave way to the same one."""
+    desk, kept = Desk(plan_path), plan_path.with_name("field.gpkg.bak")
+    desk.edit({"do": "status", "no": 3, "status": "rejected"})
+    desk.save()
+    earlier = kept.read_bytes()
+    assert desk.save()["saved_as"] == "field.gpkg"
+    assert kept.read_bytes() == earlier
+    # Tracks that are shown and do not lie in the file are not saved yet.
+    save_plan(replace(desk.session.plan, tracks=None), plan_path, read_from=plan_path)
+    again = Desk(plan_path)
+    assert (again.opening()["edited"], Shelf(plan_path).noted) == (True, False)
+    again.save()
+    assert read_plan(plan_path).tracks == again.session.plan.tracks
+    assert again.end() is None

@@ -188,6 +188,8 @@ class Desk:
                     hint="Reload it (edits made here are made again where they fit), or save your "
                     "edits under another name (see More).",
                 )
+            if not self.session.edited:  # the one before it stays the one that can be brought back
+                return {**self._state(), "saved_as": self.path.name}
             refuse_locked(self.path)
             step = self.session.whole()
             with _in_words(self.path):

@@ -52,14 +52,13 @@ class Session:
 
     def __init__(self, plan: Plan, ground: Ground | None = None) -> None:
         self._ground = ground
-        first = Step(plan)
+        as_shown = plan.tracks is not None and is_planned(plan)
         #: Whether what lies in the file was edited since its tracks were planned.
-        self.outdated = plan.tracks is not None and not is_planned(plan)
-        if plan.tracks is None or self.outdated:
-            first = planned(plan, None, with_route=not self.outdated)
+        self.outdated = plan.tracks is not None and not as_shown
+        first = Step(plan) if as_shown else planned(plan, None, with_route=False)
         self._steps = [first]
         self._at = 0
-        self._saved: Step | None = None if self.outdated else first
+        self._saved: Step | None = first if as_shown else None
 
     @property
     def step(self) -> Step:

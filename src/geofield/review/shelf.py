@@ -70,8 +70,10 @@ class Shelf:
     @property
     def noted(self) -> bool:
         """Whether edits that were not saved lie in notes, where the next session finds them."""
-        desks = self._desks.values()
-        return any(desk.session.edited and not desk.journal.refused for desk in desks)
+        return any(
+            desk.session.edited and not (desk.journal.is_empty or desk.journal.refused)
+            for desk in self._desks.values()
+        )
 
     @property
     def lost(self) -> bool:
