@@ -407,6 +407,19 @@ def test_a_picture_without_data_is_told(plan_path: Path) -> None:
     assert "The picture scene.tif holds no data" in told
 
 
+def test_a_picture_that_is_cut_off_stops_no_review(plan_path: Path) -> None:
+    """There was no page at all, and what a session before it had noted could not be reached."""
+    Desk(plan_path).edit({"do": "status", "no": 3, "status": "rejected"})
+    scene = plan_path.with_name("scene.tif")
+    scene.write_bytes(scene.read_bytes()[:3000])
+    shown = Desk(plan_path).opening()
+    assert "The picture is not shown: The picture scene.tif cannot be" in shown["brought_back"]
+    assert shown["brought_back"].startswith("1 edit of a session")
+    assert shown["picture"] is None
+    with pytest.raises(GeofieldError, match="truncated or damaged"):
+        Desk(plan_path, scene)  # asked for by name
+
+
 def test_tracks_of_which_nothing_is_known_are_told_to_be_planned_anew(plan_path: Path) -> None:
     """Those that had been imported were replaced by the first saving, without a word."""
     assert Desk(plan_path).opening()["brought_back"] is None

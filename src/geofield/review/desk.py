@@ -93,6 +93,7 @@ class Desk:
             return None, lost if plan.field.imagery else None
         try:
             picture = TiledPicture.open(path, plan.field.crs, plan.point)
+            shows = picture.has_data(plan.field.polygon.bounds)
         except GeofieldError as error:
             if self._picture_given:
                 raise
@@ -103,7 +104,7 @@ class Desk:
                 None,
                 f"The picture is not shown: {path.name} is of another place than this field.",
             )
-        if not picture.has_data(plan.field.polygon.bounds):
+        if not shows:
             return picture, f"The picture {path.name} holds no data at this field."
         return picture, None
 

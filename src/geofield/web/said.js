@@ -102,6 +102,7 @@ export const SAID = {
     [/^The plan was changed since an earlier session .*: (\d+) of its (\d+) edits? (?:was|were) made again\.$/, "Der Plan wurde geändert, seit eine Sitzung ohne Speichern endete: $1 ihrer $2 Änderungen sind wieder da."],
     [/^The picture of this plan is not beside it; --picture shows one\.$/, "Das Bild dieses Plans liegt nicht daneben; --picture zeigt eines."],
     [/^The picture is not shown: There is no picture (.*)\. Check the path;.* raster file\.$/, "Das Bild ist nicht zu sehen: $1 gibt es nicht."],
+    [/^The picture is not shown: The picture (.*) cannot be read to its end: .*$/, "Das Bild ist nicht zu sehen: $1 ist beschädigt."],
     [/^The picture is not shown: (.*) is of another place than this field\.$/, "Das Bild ist nicht zu sehen: $1 zeigt einen anderen Ort als dieses Feld."],
     [/^The picture (.*) holds no data at this field\.$/, "Das Bild $1 enthält an diesem Feld keine Daten."],
     [/^The outline lies outside the picture\.$/, "Der Umriss liegt außerhalb des Bildes."],
