@@ -15,6 +15,7 @@ from click.testing import CliRunner
 import geofield as gf
 from geofield.cli.main import cli
 from geofield.formats import read_dataset, validate_file
+from geofield_command import run_geofield
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
 Lines = tuple[list[tuple[float, float]], ...]
@@ -72,6 +73,18 @@ def test_agopengps_drives_the_bends_of_a_drawn_line(tmp_path: Path) -> None:
     # The heading of a straight stretch is that of its step.
     assert points[5, 2] == pytest.approx(np.arctan2(*steps[5]), abs=2e-3)
     assert not [each for each in validate_file(folder) if each.level == "error"]
+
+
+def test_what_is_copied_in_place_is_driven_once_and_told_once(tmp_path: Path) -> None:
+    plan = _planned(tmp_path)
+    for layer in ("tracks", "segments"):
+        rows = gpd.read_file(plan, layer=layer)
+        pd.concat([rows, rows[:2]]).to_file(plan, layer=layer, mode="w")
+    done = run_geofield("export", plan, "--format", "geojson", "--out", tmp_path / "out")
+    told = " ".join(done.stderr.split())
+    for layer in ("tracks", "segments"):
+        assert told.count(f"Layer '{layer}': 2 rows are copied in place and count once") == 1
+        assert len(gpd.read_file(tmp_path / f"out/geojson/{layer}.geojson")) == 10
 
 
 @pytest.mark.parametrize(

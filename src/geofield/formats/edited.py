@@ -68,6 +68,8 @@ def _driven(dataset: Dataset) -> Dataset:
     if not Tracks.lie_in(dataset.tables, evidence):
         return dataset
     tracks = Tracks.from_tables(dataset.tables, evidence["tracks"], grid=dataset.grid)
+    # Without the rows that were copied in place: they count once.
+    dataset = replace(dataset, tables={**dataset.tables, **tracks.tables()})
     of_before = tracks.edits_since(known) == known
     if of_before and not tracks.partial:
         return dataset
