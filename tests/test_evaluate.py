@@ -48,7 +48,7 @@ def test_matching_is_one_to_one_and_symmetric(a, b):
     assert len(set(match.truth_index)) == len(match.truth_index)
     assert np.all(match.distance <= 6)
     assert len(match_points(b, a, 6).truth_index) == len(match.truth_index)
-    assert len(match.missed_index) + len(match.truth_index) == len(b)
+    assert (match.detected_count, match.truth_count) == (len(a), len(b))
 
 
 def test_figures_of_a_hand_made_case():

@@ -219,11 +219,6 @@ class Grid:
         x, y = self.to_crs(coordinates[:, 0], coordinates[:, 1], self.metric_crs)
         return np.column_stack([x, y])
 
-    def from_metric_array(self, coordinates: FloatArray) -> FloatArray:
-        """Metric CRS coordinates (n, 2) to pixel coordinates (n, 2)."""
-        x, y = self.from_crs(coordinates[:, 0], coordinates[:, 1], self.metric_crs)
-        return np.column_stack([x, y])
-
     # -- sizes on the ground -----------------------------------------------------------
 
     @cached_property

@@ -142,7 +142,7 @@ def test_what_is_not_trusted_says_why(certainty):
     """Between where doubt is told and where trust begins the warning gave no reason."""
     truth = simulate_field(2, SimulationSettings(width_px=320, height_px=320))
     scene = truth.scene
-    outline = shapely.transform(truth.field.polygon, scene.grid.from_metric_array)
+    outline = truth.field.polygon_px(scene.grid)
     mask = truth.field.mask(scene.grid, holes=False)
     found = Segmentation(mask, (), (("certainty", certainty),))
     seed = scene.pixel_of(lat=truth.lat, lon=truth.lon)

@@ -79,7 +79,7 @@ def test_points_are_obeyed_whatever_the_picture_shows(sample):
                 search=search,
             )
         for one in (field.polygon, *(each.polygon for each in field.alternatives)):
-            outline = shapely.transform(one, scene.grid.from_metric_array)
+            outline = replace(field, polygon=one).polygon_px(scene.grid)
             assert all(shapely.contains_xy(outline, *xy) for xy in places[::2])
             assert not any(shapely.contains_xy(outline, *xy) for xy in places[1::2])
 

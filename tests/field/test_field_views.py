@@ -204,7 +204,7 @@ def test_no_alternative_ends_where_the_search_did(wide):
     left, top, width, height = part.box
     sides = shapely.box(left, top, left + width, top + height).exterior.buffer(1.0)
     for one in field.alternatives:
-        border = shapely.transform(one.polygon, scene.grid.from_metric_array).exterior
+        border = replace(field, polygon=one.polygon).polygon_px(scene.grid).exterior
         assert border.intersection(sides).length < 0.02 * border.length
 
 

@@ -38,11 +38,6 @@ class Matches:
     truth_count: int
 
     @property
-    def missed_index(self) -> NDArray[np.intp]:
-        """Truths that nothing was matched with."""
-        return np.setdiff1d(np.arange(self.truth_count), self.truth_index)
-
-    @property
     def false_index(self) -> NDArray[np.intp]:
         """Detections that match nothing."""
         return np.setdiff1d(np.arange(self.detected_count), self.detected_index)

@@ -2,9 +2,7 @@
 
 from geofield.model.dataset import Dataset, Provenance
 from geofield.model.field import Alternative, Field, FieldQuality
-from geofield.model.obstacles import ObstacleShapes
 from geofield.model.scene import ImagerySource, Scene
-from geofield.model.track_statistics import ObstacleLoss, TrackStatistics
 from geofield.model.tracks import Tracks
 
 __all__ = [
@@ -13,10 +11,7 @@ __all__ = [
     "Field",
     "FieldQuality",
     "ImagerySource",
-    "ObstacleLoss",
-    "ObstacleShapes",
     "Provenance",
     "Scene",
-    "TrackStatistics",
     "Tracks",
 ]

@@ -24,12 +24,7 @@ from geofield.grid import Grid
 from geofield.model.copies import without_copies
 from geofield.model.merged_rows import unmerged
 from geofield.model.obstacle_numbers import lost_numbers, possible_numbers
-from geofield.model.obstacles import (
-    FloatArray,
-    floats,
-    from_polygons,
-    still_round,
-)
+from geofield.model.obstacles import FloatArray, floats, from_polygons, still_round
 from geofield.model.resized import as_areas, circles, differ, grown, shape_now, widened
 from geofield.model.whole_layer import tell_all_reshaped, tell_none_left
 from geofield.model.written import (
@@ -127,14 +122,12 @@ def reconcile(
         parts = [part for part in (result, added) if len(part)]
         result = schema.conform(schema.OBSTACLES, pd.concat(parts) if parts else added, extras=True)
         kept = np.append(kept, np.ones(len(added), bool))
-    former = [] if written is None else list(written.removed)
-    if written is not None:
-        left = set(result["obstacle_no"].tolist())
-        tell_none_left(written.rows, result)
-        elsewhere += [row.shape for row in written.rows if row.obstacle_no not in left]
+    tell_none_left(earlier.rows, result)
+    left = set(result["obstacle_no"].tolist())
+    elsewhere += [row.shape for row in earlier.rows if row.obstacle_no not in left]
     gone = matches(shapes_of_plain(elsewhere), result.geometry) < 0
-    former += [shape for shape, away in zip(elsewhere, gone, strict=True) if away]
-    now = Written.of(result, kept, former, earlier.last_no)
+    removed = [shape for shape, away in zip(elsewhere, gone, strict=True) if away]
+    now = Written.of(result, kept, [*earlier.removed, *removed], earlier.last_no)
     # What nobody changed is measured by what was written still, or it would drift.
     same = set(rows.at["obstacle_no"][known[~changed[known]]].tolist())
     measures = (
