@@ -5,14 +5,7 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-from qgis.core import (
-    QgsCoordinateTransform,
-    QgsGeometry,
-    QgsPointXY,
-    QgsProject,
-    QgsVectorLayer,
-    QgsWkbTypes,
-)
+from qgis.core import QgsCoordinateTransform, QgsPointXY, QgsProject, QgsVectorLayer
 from qgis.PyQt.QtCore import QTimer
 from qgis.PyQt.QtWidgets import (
     QDockWidget,
@@ -24,10 +17,10 @@ from qgis.PyQt.QtWidgets import (
 
 from . import plan_files, sources
 from .algorithm import path_of
-from .engine import EngineError
+from .engine import EngineError, said
 from .jobs import Live
 from .keys import REDO, UNDO, Keys, written
-from .map_tools import BorrowedMap, CircleTool, PointTool, band
+from .map_tools import BorrowedMap, CircleTool, Mark, PointTool
 from .preview import Preview
 from .review import OPEN, Review, by_doubt, value
 from .review_labels import ReviewLabels
@@ -35,8 +28,6 @@ from .words import tr
 
 #: Edits that follow each other this closely are planned once, milliseconds.
 _PAUSE_MS = 60
-#: How much of the map around an obstacle is shown, in its own diameters.
-_AROUND = 7.0
 _STEP_M = 0.25
 #: Buttons that need no obstacle.
 _OF_PLAN = ("draw", "save")
@@ -54,10 +45,10 @@ class ReviewDock(QDockWidget):
         self.current: int | None = None
         self.borrowed = BorrowedMap(self.canvas)
         self.live = Live(self)
-        self.live.failed.connect(self._trouble)
+        self.live.failed.connect(self._fail)
         self._released: plan_files.Released | None = None
         self._connections: list[tuple[Any, Any]] = []
-        self._mark = band(self.canvas, QgsWkbTypes.GeometryType.PolygonGeometry, "#00e5ff", 3)
+        self._mark = Mark(self.canvas)
         self.preview = Preview(self.canvas)
         self._build()
         self._timer = QTimer(self)
@@ -122,7 +113,7 @@ class ReviewDock(QDockWidget):
         self.buttons["open"].setEnabled(self._released is None)
         self.buttons["undo"].setEnabled(layer is not None and layer.undoStack().canUndo())
         self.buttons["redo"].setEnabled(layer is not None and layer.undoStack().canRedo())
-        unsaved = layer is not None and layer.isModified()
+        unsaved = layer is not None and any(each.isModified() for each in self._followed())
         self.setWindowTitle(tr("Review of a field") + (" *" if unsaved else ""))
         self.labels.tell(
             None if self.review is None else self.review.layer, self.path, self.current
@@ -132,6 +123,8 @@ class ReviewDock(QDockWidget):
 
     def open(self, path: str = "") -> bool:
         """Review a plan: the one named, that of the active layer, or the first one there is."""
+        if self._released is not None and not path:
+            return False  # the plan that is here is being written
         active = path_of(self.iface.activeLayer()) if self.iface.activeLayer() else ""
         others = [path_of(layer) for layer in QgsProject.instance().mapLayers().values()]
         for candidate in (path or "", active, *others):
@@ -145,15 +138,20 @@ class ReviewDock(QDockWidget):
     def _take(self, path: str, layer: QgsVectorLayer) -> None:
         self.close_review()
         self.path, self.review = path, Review(layer)
-        self._connect(layer.undoStack().indexChanged, self._edited)
-        self._connect(layer.afterCommitChanges, self._saved)
-        self._connect(layer.afterRollBack, self._edited)
+        for each in self._followed():
+            self._connect(each.undoStack().indexChanged, self._edited)
+            self._connect(each.afterCommitChanges, self._saved)
+            self._connect(each.afterRollBack, self._edited)
         self.current = None
         self._tell()
         self.step(1)
         self.replan(preview=False)
-        if not layer.supportsEditing():
-            self._trouble(tr("The obstacles are read-only here: nothing can be decided."))
+        self._may_edit(of_one=False)
+
+    def _followed(self) -> list[QgsVectorLayer]:
+        """The layers whose edits the tracks follow: obstacles and outline."""
+        outline = plan_files.layers_of(self.path).get("field")
+        return [self.review.layer, *([] if outline is None else [outline])]
 
     def _connect(self, signal: Any, slot: Any) -> None:
         signal.connect(slot)
@@ -170,7 +168,7 @@ class ReviewDock(QDockWidget):
         self.review, self.current = None, None
         self._timer.stop()
         self.preview.clear()
-        self._mark.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
+        self._mark.show(None)
         self._tell()
 
     def _layers_go(self, ids: list[str]) -> None:
@@ -183,8 +181,9 @@ class ReviewDock(QDockWidget):
         self.close_review()
         self._keys.remove()
         self.live.close()
+        self._take_back()
         self.preview.remove()
-        self.canvas.scene().removeItem(self._mark)
+        self._mark.remove()
         self.iface.removeDockWidget(self)
         self.deleteLater()
 
@@ -200,9 +199,18 @@ class ReviewDock(QDockWidget):
         at = queue.index(self.current) + by if self.current in queue else 0
         self._go(queue[at % len(queue)])
 
+    def _may_edit(self, *, of_one: bool = True) -> bool:
+        """Whether there is something to edit; what is read-only is told."""
+        if self.review is None or (of_one and self.current is None):
+            return False
+        if not self.review.layer.supportsEditing():
+            self._trouble(tr("The obstacles are read-only here: nothing can be decided."))
+            return False
+        return True
+
     def decide(self, status: str) -> None:
         """Confirm or reject the obstacle, and go to the most doubtful one that is left."""
-        if self.review is None or self.current is None:
+        if not self._may_edit():
             return
         self.review.set_status(self.current, status)
         for feature_id in by_doubt(self.review.layer):
@@ -213,7 +221,7 @@ class ReviewDock(QDockWidget):
 
     def resize_by(self, by_m: float) -> None:
         """Make the obstacle a little larger or smaller."""
-        if self.review is None or self.current is None:
+        if not self._may_edit():
             return
         if self.review.resize(self.current, by_m) is None:
             self._trouble(tr("This obstacle is not round: use QGIS's vertex tool."))
@@ -221,7 +229,7 @@ class ReviewDock(QDockWidget):
 
     def begin_move(self) -> None:
         """The next click on the map is the obstacle's middle."""
-        if self.review is not None and self.current is not None:
+        if self._may_edit():
             self.borrowed.use(PointTool(self.canvas, self._move_to, self.borrowed.drop))
 
     def _move_to(self, point: QgsPointXY, shift: bool, alt: bool) -> None:
@@ -232,7 +240,7 @@ class ReviewDock(QDockWidget):
 
     def begin_draw(self) -> None:
         """The next drag on the map is a new obstacle."""
-        if self.review is not None:
+        if self._may_edit(of_one=False):
             self.borrowed.use(CircleTool(self.canvas, self._drawn, self.borrowed.drop))
 
     def _drawn(self, middle: QgsPointXY, edge: QgsPointXY) -> None:
@@ -240,7 +248,9 @@ class ReviewDock(QDockWidget):
         if not self._ready:
             return
         middle, edge = self._to_layer(middle), self._to_layer(edge)
-        self.review.add(middle, middle.distance(edge))
+        self.current = self.review.add(middle, middle.distance(edge))
+        self._show_mark()
+        self._tell()
 
     def undo(self) -> None:
         """Take the last edit back; it is the layer's own undo."""
@@ -259,13 +269,13 @@ class ReviewDock(QDockWidget):
 
     def save(self) -> None:
         """Save the edits into the plan's file; the tracks in it follow."""
-        if self.review is None:
+        if not self._ready:
             return
-        layer = self.review.layer
-        if layer.isEditable():
+        edited = [each for each in self._followed() if each.isModified()]
+        for layer in edited:
             if not layer.commitChanges():
                 self._trouble("; ".join(layer.commitErrors()))
-        else:
+        if not edited:
             self._saved()
 
     # -- tracks that follow ------------------------------------------------------------------
@@ -273,6 +283,7 @@ class ReviewDock(QDockWidget):
     def _edited(self, *_: Any) -> None:
         self._timer.start()
         self.review.layer.triggerRepaint()
+        self._show_mark()
         self._tell()
 
     def replan(self, *, preview: bool = True) -> None:
@@ -295,7 +306,7 @@ class ReviewDock(QDockWidget):
 
     def _show_figures(self, answer: dict[str, Any]) -> bool:
         if "error" in answer:
-            self._trouble(answer["error"]["message"])
+            self._trouble(said(answer["error"]))
             return False
         self.labels.tell_figures(answer)
         self.labels.tell_outline(self.path)
@@ -314,9 +325,9 @@ class ReviewDock(QDockWidget):
         except EngineError as error:
             self._trouble(str(error))
             return
-        self._timer.stop()
-        self._mark.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
+        self._mark.show(None)
         self._released = plan_files.Released(self.path)
+        self._timer.stop()
         self._tell()
         self.live.ask({"do": "write", "file": self.path}, self._written)
 
@@ -330,6 +341,10 @@ class ReviewDock(QDockWidget):
         self.step(1)
         self._tell()
 
+    def _fail(self, why: str) -> None:
+        self._take_back()
+        self._trouble(why)
+
     def _take_back(self) -> None:
         released, self._released = self._released, None
         if released is not None:
@@ -340,27 +355,14 @@ class ReviewDock(QDockWidget):
 
     def _go(self, feature_id: int) -> None:
         self.current = feature_id
-        feature = self.review.layer.getFeature(feature_id)
-        box = feature.geometry().boundingBox()
-        turned = QgsCoordinateTransform(
-            self.review.layer.crs(),
-            self.canvas.mapSettings().destinationCrs(),
-            QgsProject.instance(),
-        )
-        box = turned.transformBoundingBox(box)
-        box.scale(_AROUND)
-        self.canvas.setExtent(box)
-        self.canvas.refresh()
         self._show_mark()
+        self._mark.look_at()
         self._tell()
 
     def _show_mark(self) -> None:
-        self._mark.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
-        if self.review is None or self.current is None:
-            return
-        feature = self.review.layer.getFeature(self.current)
-        if feature.isValid():
-            self._mark.addGeometry(QgsGeometry(feature.geometry()), self.review.layer.crs())
+        self._mark.show(None if self.review is None else self.review.layer, self.current)
+        if not self._mark.is_shown:  # deleted: the next key speaks of none
+            self.current = None
 
     def _to_layer(self, point: QgsPointXY) -> QgsPointXY:
         return QgsCoordinateTransform(
@@ -370,7 +372,6 @@ class ReviewDock(QDockWidget):
         ).transform(point)
 
     def _trouble(self, text: str) -> None:
-        if self._released is not None:
-            self._take_back()
-        # The bar reads HTML.
-        self.iface.messageBar().pushWarning("geofield", escape(text))
+        bar, text = self.iface.messageBar(), escape(text)  # the bar reads HTML
+        if all(item.text() != text for item in bar.items()):  # each edit would tell it again
+            bar.pushWarning("geofield", text)

@@ -13,6 +13,7 @@ import os
 import shutil
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Callable
@@ -258,9 +259,7 @@ class Reader:
     def why(self, code: int, crashed: bool) -> str:
         """Why the command failed, in its own words."""
         if self._error:
-            return " ".join(
-                part for part in (self._error["message"], self._error.get("hint")) if part
-            )
+            return said(self._error)
         last = " ".join(self._lines[-3:])
         if crashed or not last:
             ended = tr("The engine ended unexpectedly (code {0}).").format(code)
@@ -274,6 +273,11 @@ class Reader:
             return Result(json.loads(text) if text else None, self._lines)
         except ValueError:
             return Result(None, [*self._lines, *text.splitlines()])
+
+
+def said(error: Mapping[str, str]) -> str:
+    """An error in the engine's own words, with what to do."""
+    return " ".join(part for part in (error["message"], error.get("hint")) if part)
 
 
 def _as_object(line: str) -> dict[str, Any]:

@@ -1,14 +1,17 @@
-"""Tools of the map: plan the field here; where to put an obstacle; draw one."""
+"""Tools and marks of the map: plan the field here; where to put an obstacle; draw one."""
 
 from __future__ import annotations
 
 from typing import Any, Callable
 
-from qgis.core import QgsGeometry, QgsPointXY, QgsWkbTypes
+from qgis.core import QgsGeometry, QgsPointXY, QgsVectorLayer, QgsWkbTypes
 from qgis.gui import QgsMapCanvas, QgsMapTool, QgsRubberBand
 from qgis.PyQt.QtCore import QPoint, Qt
 from qgis.PyQt.QtGui import QColor
 from qgis.PyQt.QtWidgets import QApplication
+
+#: How much of the map around an obstacle is shown, in its own diameters.
+_AROUND = 7.0
 
 
 class _Tool(QgsMapTool):
@@ -120,6 +123,39 @@ class BorrowedMap:
         self.canvas.unsetMapTool(self._tool)
         if self._before is not None:
             self.canvas.setMapTool(self._before)
+
+
+class Mark:
+    """Shows which obstacle is looked at."""
+
+    def __init__(self, canvas: QgsMapCanvas) -> None:
+        self.canvas = canvas
+        self._band = band(canvas, QgsWkbTypes.GeometryType.PolygonGeometry, "#00e5ff", 3)
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether there is one, with a shape."""
+        return not self._band.asGeometry().isEmpty()
+
+    def show(self, layer: QgsVectorLayer | None, feature_id: int | None = None) -> None:
+        """Mark a feature of a layer; none where there is none."""
+        self._band.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
+        if layer is not None and feature_id is not None:
+            feature = layer.getFeature(feature_id)
+            if feature.hasGeometry():
+                self._band.addGeometry(QgsGeometry(feature.geometry()), layer.crs())
+
+    def look_at(self) -> None:
+        """Have the map show it."""
+        if self.is_shown:
+            box = self._band.asGeometry().boundingBox()
+            box.scale(_AROUND)
+            self.canvas.setExtent(box)
+            self.canvas.refresh()
+
+    def remove(self) -> None:
+        """Leave nothing on the map."""
+        self.canvas.scene().removeItem(self._band)
 
 
 def band(canvas: QgsMapCanvas, kind: Any, colour: str, width: int = 2) -> QgsRubberBand:

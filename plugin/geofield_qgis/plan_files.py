@@ -37,14 +37,21 @@ def layers_of(path: str) -> dict[str, QgsVectorLayer]:
 def as_edited(path: str, obstacles: QgsVectorLayer) -> dict[str, Any]:
     """Obstacles and outline of a plan as they are now, saved or not, for the engine."""
     names, rows = obstacles.fields().names(), []
-    for feature in _rows_of(obstacles):
+    for feature in _shapes_of(obstacles):
         values = dict(zip(names, feature.attributes()))
         row = {k: v for k, v in values.items() if isinstance(v, (int, float, str)) and v != NULL}
         rows.append({**row, "wkb": _hex(feature.geometry())})
     field = layers_of(path).get("field")
-    outline = None if field is None else next(field.getFeatures(), None)
-    told = {} if outline is None else {"outline": _hex(outline.geometry())}
-    return {"obstacles": rows, **told}
+    return {"obstacles": rows, **({} if field is None else {"outline": _outline(field)})}
+
+
+def _outline(field: QgsVectorLayer) -> str:
+    """The outline as it is edited; that it is one polygon, the engine sees to."""
+    shapes = [each.geometry() for each in _shapes_of(field)]
+    if len(shapes) == 1:
+        return _hex(shapes[0])
+    none = QgsGeometry.fromWkt("GeometryCollection EMPTY")
+    return _hex(QgsGeometry.collectGeometry(shapes) if shapes else none)
 
 
 def _hex(geometry: QgsGeometry) -> str:
@@ -52,14 +59,15 @@ def _hex(geometry: QgsGeometry) -> str:
     return bytes(geometry.asWkb()).hex()
 
 
-def _rows_of(layer: QgsVectorLayer) -> Iterator[QgsFeature]:
-    """The rows of a layer as they are edited, and those that its filter hides."""
-    yield from layer.getFeatures()
+def _shapes_of(layer: QgsVectorLayer) -> Iterator[QgsFeature]:
+    """The rows with a shape of a layer as they are edited, and those that its filter hides."""
+    rows = list(layer.getFeatures())
     if layer.subsetString():
         edits, whole = layer.editBuffer(), layer.clone()
         known = {*layer.allFeatureIds(), *(edits.deletedFeatureIds() if edits else ())}
         whole.setSubsetString("")
-        yield from (each for each in whole.getFeatures() if each.id() not in known)
+        rows += [each for each in whole.getFeatures() if each.id() not in known]
+    return (each for each in rows if each.hasGeometry())
 
 
 class Released:
@@ -71,23 +79,25 @@ class Released:
     """
 
     def __init__(self, path: str) -> None:
-        self._held: list[tuple[QgsVectorLayer, str, bool]] = []
+        self._held: list[tuple[QgsVectorLayer, str, bool, bool]] = []
         self._described: dict[str, QDomElement] = {}
         QgsProject.instance().writeMapLayer.connect(self._describe)
         for layer in all_of(path):
             editing = layer.isEditable()
             if editing:
                 layer.rollBack()  # nothing is lost: it was asked for after saving
-            self._held.append((layer, layer.source(), editing))
+            self._held.append((layer, layer.source(), editing, layer.readOnly()))
             self._described[layer.id()] = _described(layer)
             kind = QgsWkbTypes.displayString(layer.wkbType())
             _point_to(layer, f"{kind}?crs={layer.crs().authid()}", "memory")
+            layer.setReadOnly(True)  # what QGIS's tools did to it would be lost
 
     def back(self) -> None:
         """Take the file up again."""
         QgsProject.instance().writeMapLayer.disconnect(self._describe)
-        for layer, source, editing in self._held:
+        for layer, source, editing, read_only in self._held:
             try:
+                layer.setReadOnly(read_only)
                 _point_to(layer, source, "ogr")
                 if editing:
                     layer.startEditing()

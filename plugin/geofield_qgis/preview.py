@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from qgis.core import QgsGeometry, QgsPointXY, QgsProject, QgsWkbTypes
+from qgis.PyQt.QtXml import QDomDocument
 
 from .map_tools import band
 
@@ -27,6 +28,7 @@ class Preview:
             "headland_tracks": band(canvas, _LINES, "#ffffff", 2),
         }
         self._hidden: list[str] = []
+        QgsProject.instance().writeProject.connect(self._describe)
 
     @property
     def is_shown(self) -> bool:
@@ -64,5 +66,14 @@ class Preview:
     def remove(self) -> None:
         """Leave nothing on the map."""
         self.clear()
+        QgsProject.instance().writeProject.disconnect(self._describe)
         for sketch in self._bands.values():
             self.canvas.scene().removeItem(sketch)
+
+    def _describe(self, document: QDomDocument) -> None:
+        """Have a project that is being saved show the layers: it holds no sketch."""
+        nodes = document.elementsByTagName("layer-tree-layer")
+        for number in range(nodes.count()):
+            node = nodes.at(number).toElement()
+            if node.attribute("id") in self._hidden:
+                node.setAttribute("checked", "Qt::Checked")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Callable
@@ -17,6 +18,8 @@ OPEN = ("detected", "possible")
 RADII_M = (0.1, 200.0)
 #: Corners of a circle that is drawn.
 _CORNERS_PER_QUARTER = 12
+#: How much of the circle around it a circle with corners fills at least.
+_CIRCLE = 0.98
 
 
 def value(feature: QgsFeature, name: str, default: Any = None) -> Any:
@@ -31,10 +34,25 @@ def doubt(feature: QgsFeature) -> float:
     return 1.0 - abs(2.0 * float(value(feature, "confidence", 0.5)) - 1.0)
 
 
+def _radius_m(feature: QgsFeature) -> float | None:
+    """Of a round obstacle; one that was drawn is round where it is a circle.
+
+    0 is none, as programs write it that know no empty number.
+    """
+    known = value(feature, "radius_m")
+    if known or value(feature, "status") in OPEN:
+        return known or None
+    _, _, around = feature.geometry().minimalEnclosingCircle()
+    is_circle = feature.geometry().area() > _CIRCLE * math.pi * around**2
+    return around - value(feature, "buffer_m", 0.0) if is_circle else None
+
+
 def by_doubt(layer: QgsVectorLayer) -> list[int]:
     """Ids of the obstacles: those nobody spoke about first, the most doubtful at the front."""
     found = []
     for feature in layer.getFeatures():
+        if not feature.hasGeometry():
+            continue
         reviewed = value(feature, "status", "added") not in OPEN
         number = value(feature, "obstacle_no", 0)
         found.append((reviewed, -doubt(feature), number, feature.id()))
@@ -79,8 +97,8 @@ class Review:
     def resize(self, feature_id: int, by_m: float) -> float | None:
         """Make a round obstacle larger or smaller; its new radius, None for what is not round."""
         feature = self.layer.getFeature(feature_id)
-        radius_m = value(feature, "radius_m")
-        if not radius_m:  # 0 is none, as programs write it that know no empty number
+        radius_m = _radius_m(feature)
+        if radius_m is None:
             return None
         margin_m = value(feature, "buffer_m", 0.0)
         new_m = min(max(radius_m + by_m, RADII_M[0]), RADII_M[1])
@@ -94,12 +112,13 @@ class Review:
         geometry.transform(scaling)
         with self._step(tr("Radius of obstacle")):
             self.layer.changeGeometry(feature_id, geometry)
-            self._set(feature_id, "radius_m", new_m)
+            if value(feature, "radius_m") is not None:
+                self._set(feature_id, "radius_m", new_m)
             self._stands(feature_id)
         return new_m
 
-    def add(self, middle: QgsPointXY, radius: float) -> None:
-        """Draw a round obstacle that nobody had found, in units of the layer's CRS.
+    def add(self, middle: QgsPointXY, radius: float) -> int:
+        """Draw a round obstacle that nobody had found, in units of the layer's CRS; its id.
 
         It is taken exactly as drawn: the circle is what no vehicle enters.
         """
@@ -109,6 +128,7 @@ class Review:
         feature.setAttribute("status", "added")
         with self._step(tr("Draw obstacle")):
             self.layer.addFeature(feature)
+        return feature.id()
 
     def undo(self) -> list[int]:
         """Take the last edit back; the ids of the obstacles that are otherwise now."""

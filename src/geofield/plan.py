@@ -193,8 +193,8 @@ class Plan:
         rows = dataset.table(schema.FIELD.name)
         if len(rows) != 1:
             next_step = (
-                "Merge or delete rows of its layer `field`; many fields are the work of `geofield "
-                "tracks` and `geofield batch`."
+                "Merge or delete rows of its layer `field` where that is one; of a farm `geofield "
+                "farm get` takes a field out, `geofield farm put` takes edits in its farm.gpkg in."
                 if len(rows)
                 else "Draw the outline in its layer `field`; `geofield undo` brings back the plan "
                 "before the last run."

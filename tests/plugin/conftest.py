@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import sys
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from geofield_command import run_geofield
 from real_qgis import asking, environment_in, mark_all
 
 sys.path.insert(0, str(Path(__file__).parent))
-from plugin_place import CLIENT, PLUGINS, ROOT
+from plugin_place import CLIENT, PLUGINS, ROOT, SAMPLE
 
 
 def pytest_collection_modifyitems(items):
@@ -51,3 +52,18 @@ def geofield():
             return run_geofield(*words, folder=ROOT, check=True)
 
     return call
+
+
+@pytest.fixture(scope="session")
+def reviewable(geofield, tmp_path_factory):
+    """The sample planned, in a folder."""
+    folder = tmp_path_factory.mktemp("panel") / "out"
+    place = ("--lat", 35.075373, "--lon", 33.531142)
+    geofield("run", SAMPLE, *place, "--spacing", 8, "--out", folder)
+    return folder
+
+
+@pytest.fixture
+def plan(reviewable, tmp_path):
+    """A copy of its plan: each test changes it."""
+    return str(shutil.copytree(reviewable, tmp_path / "plan") / "field.gpkg")

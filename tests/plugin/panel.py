@@ -356,10 +356,18 @@ _ALL = (
 )  # fmt: skip
 ACTIONS = {each.__name__: each for each in _ALL}
 
-if __name__ == "__main__":
+
+def begin():
+    """A QGIS with the plugin at hand, and the window."""
+    global application, window  # noqa: PLW0603 - there is one of each
     QgsApplication.setPrefixPath("/usr", True)
     application = QgsApplication([], True)
     application.initQgis()
     sys.path += ["/usr/share/qgis/python/plugins", os.environ["QGIS_PLUGINPATH"]]
     window = Window()
+    return window
+
+
+if __name__ == "__main__":
+    begin()
     answer(ACTIONS)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import pytest
@@ -17,20 +16,6 @@ from real_qgis import asking
 def panel(qgis_environment):
     with asking(CLIENT.with_name("panel.py"), qgis_environment) as ask:
         yield ask
-
-
-@pytest.fixture(scope="module")
-def planned(geofield, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("panel") / "out"
-    place = ("--lat", 35.075373, "--lon", 33.531142)
-    geofield("run", SAMPLE, *place, "--spacing", 8, "--out", folder)
-    return folder
-
-
-@pytest.fixture
-def plan(planned, tmp_path):
-    """A copy: each test changes it."""
-    return str(shutil.copytree(planned, tmp_path / "plan") / "field.gpkg")
 
 
 def test_saving_takes_no_edits_of_another_layer(panel, plan):

@@ -1,0 +1,171 @@
+"""Edits around the panel that its keys do not make; run by Debian's Python as `panel` is."""
+
+import panel
+from client import answer
+from panel import begin, reviewed, settled, until
+from qgis.core import QgsApplication, QgsFeature, QgsGeometry, QgsProject, QgsRectangle
+from qgis.PyQt.QtTest import QTest
+
+
+def opened(plan):
+    layers, dock = reviewed(plan)
+    dock.show()
+    dock.open(plan)
+    settled(dock)
+    return layers, dock
+
+
+def written(dock):
+    until(lambda: dock._released is not None)
+    settled(dock)
+
+
+def outline(plan):
+    """An outline that is edited in QGIS, with an obstacle, and once more by itself."""
+    layers, dock = opened(plan)
+    field, found = layers["field"], []
+
+    def narrower():
+        field.startEditing()
+        row = next(field.getFeatures())
+        field.changeGeometry(row.id(), row.geometry().buffer(-10, 4))
+        until(dock._timer.isActive)
+        settled(dock)
+        return dock.labels.figures.text(), dock.windowTitle()
+
+    found.append((dock.labels.figures.text(), dock.windowTitle()))
+    found.append(narrower())
+    dock.decide("rejected")
+    settled(dock)
+    dock.save()
+    written(dock)
+    found.append((dock.labels.figures.text(), dock.windowTitle()))
+    found.append(narrower())
+    field.commitChanges()
+    written(dock)
+    found.append((dock.labels.figures.text(), layers["tracks"].featureCount()))
+    return {"found": found, "said": panel.window.said()}
+
+
+def outline_cut(plan):
+    """An outline that was cut in two, and one that was deleted."""
+    layers, dock = opened(plan)
+    field, said = layers["field"], panel.window.said
+    field.startEditing()
+    row = next(field.getFeatures())
+    box = row.geometry().boundingBox()
+    west = QgsRectangle(box.xMinimum(), box.yMinimum(), box.center().x(), box.yMaximum())
+    half = QgsGeometry.fromRect(west).intersection(row.geometry())
+    other = QgsFeature(field.fields())
+    other.setGeometry(row.geometry().difference(half))
+    field.changeGeometry(row.id(), half)
+    field.addFeature(other)
+    settled(dock)
+    cut = said()
+    field.deleteFeatures([each.id() for each in field.getFeatures()])
+    settled(dock)
+    return {"cut": cut, "gone": said(), "figures": dock.labels.figures.text()}
+
+
+def while_written(plan):
+    """QGIS's own tools and the panel's button in the toolbar while a plan is written."""
+    layers, dock = opened(plan)
+    layer, found = layers["obstacles"], {}
+    dock.decide("rejected")
+    dock.save()
+    until(lambda: dock._released is not None)
+    found["editing"] = layer.startEditing()
+    found["opened"] = [dock.open(""), dock._released is not None]
+    settled(dock)
+    found["after"] = [layer.startEditing(), dock.labels.count.text(), panel.window.said()]
+    dock.decide("rejected")
+    dock.save()
+    until(lambda: dock._released is not None)
+    panel.window.removeDockWidget = lambda dock: None
+    dock.remove()  # as the plugin does that is unloaded
+    found["unloaded"] = [layer.source(), layer.featureCount()]
+    return found
+
+
+def deleted_and_drawn(plan):
+    """What the keys speak of after an obstacle was deleted, one drawn, and a row has no shape."""
+    layers, dock = opened(plan)
+    layer, found = layers["obstacles"], {}
+    layer.startEditing()
+    layer.deleteFeature(dock.current)
+    steps = layer.undoStack().index()
+    QTest.keyClick(panel.window.canvas, "c")
+    dock._move_to(layer.extent().center(), False, False)
+    found["deleted"] = [layer.undoStack().index() - steps, dock.buttons["confirm"].isEnabled()]
+    middle = panel.window.canvas.extent().center()
+    edge = panel.QgsPointXY(middle.x() + 3, middle.y())
+    dock._drawn(middle, edge)
+    area = layer.getFeature(dock.current).geometry().area()
+    QTest.keyClick(panel.window.canvas, "+")
+    drawn = layer.getFeature(dock.current)
+    found["larger"] = (drawn.geometry().area() / area) ** 0.5 * 3
+    found["drawn"] = [drawn["status"], drawn["radius_m"] or None]
+    settled(dock)
+    figures = dock.labels.figures.text()
+    bare = QgsFeature(layer.fields())
+    bare.setAttribute("status", "added")
+    layer.addFeature(bare)
+    dock.undo()
+    dock.redo()
+    settled(dock)
+    found["bare"] = [dock.labels.figures.text() == figures, dock.current]
+    dock.save()
+    written(dock)
+    return {**found, "said": panel.window.said()}
+
+
+def made_read_only(plan):
+    """Keys on obstacles that were made read-only after the panel was opened."""
+    layers, _ = opened(plan)
+    layer = layers["obstacles"]
+    layer.setReadOnly(True)
+    for key in "cr+m":
+        QTest.keyClick(panel.window.canvas, key)
+    return {"steps": layer.undoStack().count(), "said": panel.window.said()}
+
+
+def project_with_sketch(plan, home):
+    """The layers that are shown, and after a project that was saved with a sketch is opened."""
+    _, dock = opened(plan)
+    project = QgsProject.instance()
+
+    def shown():
+        nodes = project.layerTreeRoot().findLayers()
+        return [node.name() for node in nodes if node.isVisible()]
+
+    found = [shown()]
+    dock.decide("rejected")
+    settled(dock)
+    found.append(shown())
+    project.write(f"{home}/project.qgz")
+    found.append(shown())
+    project.clear()
+    project.read(f"{home}/project.qgz")
+    return [*found, shown()]
+
+
+def farm(plan):
+    """What is told where there are several fields, after several edits."""
+    _, dock = opened(plan)
+    for _ in range(2):
+        dock.decide("rejected")
+        settled(dock)
+    dock.save()
+    QgsApplication.processEvents()
+    settled(dock)
+    return {"said": panel.window.said(), "count": dock.labels.count.text()}
+
+
+_ALL = (
+    outline, outline_cut, while_written, deleted_and_drawn, made_read_only, project_with_sketch,
+    farm,
+)  # fmt: skip
+
+if __name__ == "__main__":
+    begin()
+    answer({each.__name__: each for each in _ALL})

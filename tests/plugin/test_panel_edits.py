@@ -1,0 +1,84 @@
+"""The panel with what QGIS's own tools do to a plan: outlines, deletions, saved projects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from plugin_place import CLIENT, SAMPLE
+
+from geofield.formats import read_dataset
+from geofield.plan import read_plan
+from real_qgis import asking
+
+
+@pytest.fixture(scope="module")
+def panel(qgis_environment):
+    with asking(CLIENT.with_name("panel_edits.py"), qgis_environment) as ask:
+        yield ask
+
+
+def test_tracks_follow_the_outline_too(panel, plan):
+    seen = panel("outline", plan=plan)
+    before, edited, saved, again, by_qgis = seen["found"]
+    clean, starred = "Review of a field", "Review of a field *"
+    assert [each[1] for each in (before, edited, saved, again)] == [clean, starred, clean, starred]
+    assert len({each[0] for each in (before, edited, again)}) == 3
+    # Saved by QGIS's own button, the plan is planned again as well.
+    tracks = read_plan(Path(plan)).tracks
+    assert by_qgis == [again[0], len(tracks.lines)]
+    assert f"{len(tracks.lines)} tracks in {len(tracks.segments)} segments" in by_qgis[0]
+    assert read_plan(Path(plan)).field.method == "drawn"
+    assert seen["said"] == []
+
+
+def test_an_outline_that_is_not_one_polygon_is_told(panel, plan):
+    seen = panel("outline_cut", plan=plan)
+    assert seen["cut"] == seen["gone"] == ["geofield: The outline is not one polygon."]
+
+
+def test_no_edit_is_taken_while_the_plan_is_written(panel, plan):
+    seen = panel("while_written", plan=plan)
+    assert seen["editing"] is False
+    assert seen["opened"] == [False, True]
+    assert seen["after"] == [True, "20 left to look at, 1 rejected", []]
+    assert seen["unloaded"] == [f"{plan}|layername=obstacles", 21]
+
+
+def test_keys_speak_of_what_was_drawn_and_of_nothing_that_is_gone(panel, plan):
+    seen = panel("deleted_and_drawn", plan=plan)
+    assert seen["deleted"] == [0, False]
+    assert seen["larger"] == pytest.approx(3.25, abs=0.01)
+    assert seen["drawn"] == ["added", None]
+    assert seen["bare"] == [True, None]
+    assert seen["said"] == []
+    (drawn,) = read_dataset(Path(plan)).table("obstacles").query("status == 'added'").geometry
+    assert (drawn.area / 3.1416) ** 0.5 == pytest.approx(3.25, abs=0.01)
+
+
+def test_what_became_read_only_is_told(panel, plan):
+    seen = panel("made_read_only", plan=plan)
+    assert seen["steps"] == 0
+    assert seen["said"] == ["geofield: The obstacles are read-only here: nothing can be decided."]
+
+
+def test_a_project_saved_with_a_sketch_shows_the_tracks(panel, plan, tmp_path):
+    before, sketched, saved, again = panel("project_with_sketch", plan=plan, home=str(tmp_path))
+    assert before == again
+    assert "Tracks" in before
+    assert "Tracks" not in sketched
+    assert sketched == saved
+
+
+def test_several_fields_are_told_once_with_what_to_do(panel, geofield, tmp_path):
+    places = tmp_path / "places.csv"
+    places.write_text("name,lat,lon\na,35.075373,33.531142\nb,35.0765,33.5325\n")
+    geofield("batch", places, SAMPLE, "--workers", 1, "--out", tmp_path / "farm")
+    seen = panel("farm", plan=str(tmp_path / "farm" / "farm.gpkg"))
+    (said,) = seen["said"]
+    assert "this file has 2" in said
+    assert "geofield farm put" in said
+    assert "2 rejected" in seen["count"]
+    told = geofield("farm", "put", tmp_path / "farm" / "farm.gpkg", tmp_path / "farm")
+    assert "a of" in f"{told}"
+    assert "is now as you left it" in f"{told}"
