@@ -206,6 +206,10 @@ class ReviewDock(QDockWidget):
         if not self.review.layer.supportsEditing():
             self._trouble(tr("The obstacles are read-only here: nothing can be decided."))
             return False
+        if of_one and not self._mark.is_of(self.review.layer, self.current):
+            self._trouble(tr("The plan was changed outside of this panel: look again."))
+            self._take(self.path, self.review.layer)
+            return False
         return True
 
     def decide(self, status: str) -> None:
@@ -234,7 +238,7 @@ class ReviewDock(QDockWidget):
 
     def _move_to(self, point: QgsPointXY, shift: bool, alt: bool) -> None:
         self.borrowed.drop()
-        if self._ready and self.current is not None:
+        if self._ready and self._may_edit():
             self.review.move(self.current, self._to_layer(point))
             self._show_mark()
 
@@ -317,8 +321,9 @@ class ReviewDock(QDockWidget):
         QTimer.singleShot(0, self._write)
 
     def _write(self) -> None:
-        if self.review is None or self._released is not None:
+        if not self._ready:
             return
+        self._show_mark()  # what was new has another id now
         try:  # to let go of the file ends what is edited in any of its layers
             for layer in plan_files.all_of(self.path):
                 sources.refuse_unsaved(layer)

@@ -12,6 +12,8 @@ from qgis.PyQt.QtWidgets import QWidget
 #: QGIS's own keys for the layer that is active.
 UNDO, REDO = "undo", "redo"
 _STANDARD = {UNDO: QKeySequence.StandardKey.Undo, REDO: QKeySequence.StandardKey.Redo}
+#: Keys that go on while they are held; a decision is one press.
+_ON_AND_ON = ("J", "K", "+", "-")
 
 
 def written(key: str) -> str:
@@ -60,7 +62,8 @@ class Keys(QObject):
             action = self._actions.get(key)
             if action is not None and self._is_ours(key):
                 event.accept()
-                if event.type() == QEvent.Type.KeyPress:
+                held = event.isAutoRepeat() and key not in _ON_AND_ON
+                if event.type() == QEvent.Type.KeyPress and not held:
                     action()
                 return True
         return False

@@ -131,19 +131,25 @@ class Mark:
     def __init__(self, canvas: QgsMapCanvas) -> None:
         self.canvas = canvas
         self._band = band(canvas, QgsWkbTypes.GeometryType.PolygonGeometry, "#00e5ff", 3)
+        self._shape = QgsGeometry()
 
     @property
     def is_shown(self) -> bool:
         """Whether there is one, with a shape."""
-        return not self._band.asGeometry().isEmpty()
+        return not self._shape.isNull()
 
     def show(self, layer: QgsVectorLayer | None, feature_id: int | None = None) -> None:
         """Mark a feature of a layer; none where there is none."""
         self._band.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
+        self._shape = QgsGeometry()
         if layer is not None and feature_id is not None:
-            feature = layer.getFeature(feature_id)
-            if feature.hasGeometry():
-                self._band.addGeometry(QgsGeometry(feature.geometry()), layer.crs())
+            self._shape = layer.getFeature(feature_id).geometry()
+        if self.is_shown:
+            self._band.addGeometry(QgsGeometry(self._shape), layer.crs())
+
+    def is_of(self, layer: QgsVectorLayer, feature_id: int) -> bool:
+        """Whether the feature still is what was marked: other programs number rows anew."""
+        return self._shape.equals(layer.getFeature(feature_id).geometry())
 
     def look_at(self) -> None:
         """Have the map show it."""

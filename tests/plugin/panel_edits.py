@@ -2,8 +2,11 @@
 
 import panel
 from client import answer
+from osgeo import ogr
 from panel import begin, reviewed, settled, until
 from qgis.core import QgsApplication, QgsFeature, QgsGeometry, QgsProject, QgsRectangle
+from qgis.PyQt.QtCore import QEvent, Qt
+from qgis.PyQt.QtGui import QKeyEvent
 from qgis.PyQt.QtTest import QTest
 
 
@@ -161,9 +164,46 @@ def farm(plan):
     return {"said": panel.window.said(), "count": dock.labels.count.text()}
 
 
+def numbered_anew(plan):
+    """Another program gives the row that is looked at to another obstacle; two keys then."""
+    layers, dock = opened(plan)
+    layer, found = layers["obstacles"], []
+    looked_at = dock.current
+    data = ogr.Open(plan, 1)
+    rows = data.GetLayerByName("obstacles")
+    here = rows.GetFeature(looked_at)
+    other = rows.GetFeature(next(each.GetFID() for each in rows if each.GetFID() != looked_at))
+    here.SetFID(other.GetFID())
+    other.SetFID(looked_at)
+    for each in (here, other):
+        rows.SetFeature(each)
+    del rows, data
+    for _ in range(2):
+        QTest.keyClick(panel.window.canvas, "r")
+        settled(dock)
+        found.append(
+            [each["obstacle_no"] for each in layer.getFeatures() if each["status"] == "rejected"]
+        )
+    return {"found": found, "was": here["obstacle_no"], "said": panel.window.said()}
+
+
+def held(plan):
+    """Keys that a hand rests on."""
+    layers, dock = opened(plan)
+    first, layer = dock.current, layers["obstacles"]
+    for letter, key in (("r", Qt.Key.Key_R), ("j", Qt.Key.Key_J)):
+        for again in (False, True, True):
+            nothing = Qt.KeyboardModifier.NoModifier
+            press = QKeyEvent(QEvent.Type.KeyPress, key, nothing, letter, again)
+            QgsApplication.sendEvent(panel.window.canvas, press)
+    rejected = list(layer.getFeatures("status = 'rejected'"))
+    settled(dock)
+    return {"rejected": len(rejected), "stepped": dock.current != first}
+
+
 _ALL = (
     outline, outline_cut, while_written, deleted_and_drawn, made_read_only, project_with_sketch,
-    farm,
+    farm, numbered_anew, held,
 )  # fmt: skip
 
 if __name__ == "__main__":

@@ -62,6 +62,17 @@ def test_what_became_read_only_is_told(panel, plan):
     assert seen["said"] == ["geofield: The obstacles are read-only here: nothing can be decided."]
 
 
+def test_a_key_means_the_obstacle_that_is_marked(panel, plan):
+    """As `Find the obstacles` in the toolbox does with the plan that is open in the panel."""
+    seen = panel("numbered_anew", plan=plan)
+    assert seen["found"] == [[], [seen["was"]]]
+    assert seen["said"] == ["geofield: The plan was changed outside of this panel: look again."]
+
+
+def test_a_key_that_is_held_decides_once(panel, plan):
+    assert panel("held", plan=plan) == {"rejected": 1, "stepped": True}
+
+
 def test_a_project_saved_with_a_sketch_shows_the_tracks(panel, plan, tmp_path):
     before, sketched, saved, again = panel("project_with_sketch", plan=plan, home=str(tmp_path))
     assert before == again

@@ -245,6 +245,11 @@
     </message>
     <message>
       <location filename="dock.py" />
+      <source>The plan was changed outside of this panel: look again.</source>
+      <translation>Der Plan wurde außerhalb dieses Bedienfelds geändert: Sehen Sie noch einmal hin.</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
       <source>This obstacle is not round: use QGIS's vertex tool.</source>
       <translation>Dieses Hindernis ist nicht rund: nehmen Sie das Stützpunktwerkzeug von QGIS.</translation>
     </message>
