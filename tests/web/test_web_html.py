@@ -7,6 +7,7 @@ import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,8 @@ from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.support.ui import WebDriverWait
 
 import geofield as gf
+from geofield.formats import read_dataset
+from geofield.model.map_words import figures_in_words
 from geofield.web.view import place_table
 from geofield_command import run_geofield
 
@@ -89,11 +92,17 @@ def test_the_page_opens_from_the_disk_and_asks_nobody(folder: Path, tmp_path: Pa
         driver.quit()
 
 
-def test_the_page_holds_the_plan_in_its_own_zone(folder: Path) -> None:
-    text = (folder / "field.html").read_text(encoding="utf-8")
+def values_in(page: Path) -> dict[str, Any]:
+    """What a page holds."""
+    text = page.read_text(encoding="utf-8")
     found = re.search(r'<script type="application/json" id="plan">(.*?)</script>', text, re.S)
     assert found is not None
-    values = json.loads(found.group(1))
+    values: dict[str, Any] = json.loads(found.group(1))
+    return values
+
+
+def test_the_page_holds_the_plan_in_its_own_zone(folder: Path) -> None:
+    values = values_in(folder / "field.html")
     plan = gf.read_plan(folder / "field.gpkg")
     assert plan.obstacles is not None
     assert plan.tracks is not None
@@ -103,6 +112,26 @@ def test_the_page_holds_the_plan_in_its_own_zone(folder: Path) -> None:
     assert len(values["obstacles"]) == len(plan.obstacles)
     assert len(values["tracks"]) == len(plan.tracks.segments)
     assert values["picture"].startswith("data:image/webp;base64,")
+
+
+def test_imported_tracks_are_shown_and_nothing_is_said_that_nobody_recorded(
+    folder: Path, tmp_path: Path
+) -> None:
+    """The page had none of them, without a word, and the map said "heading nan"."""
+    terminal, plan, out = tmp_path / "terminal", tmp_path / "plan.gpkg", tmp_path / "out"
+    for words in (
+        ["export", folder / "field.gpkg", "-f", "isoxml", "--out", terminal],
+        ["import", terminal / "isoxml", "-o", plan],
+        ["export", plan, "-f", "html", "--out", out],
+    ):
+        run_geofield(*words, check=True)
+    values = values_in(out / "field.html")
+    there = read_dataset(plan)
+    assert len(values["tracks"]) == len(there.table("segments")) > 40
+    figures = values["figures"]
+    assert figures["length_m"] == pytest.approx(there.table("segments")["length_m"].sum())
+    assert figures["coverage_percent"] is figures["heading_deg"] is None
+    assert re.fullmatch(r"\d+ tracks, \d+ segments, \d\.\d\d km", figures_in_words(there)[2])
 
 
 def test_names_cannot_break_out(folder: Path, tmp_path: Path) -> None:

@@ -25,12 +25,14 @@ def figures_in_words(dataset: Dataset) -> list[str]:
     others = [f"{n} {status}" for status, n in idle.items() if n]
     lines.append(", ".join([counted(len(active(obstacles)), "obstacle"), *others]))
     if len(tracks):
-        heading = f"{heading_in_words(field['heading_deg'])}\N{DEGREE SIGN}"
-        lines.append(
-            f"{counted(len(tracks), 'track')}, "
-            f"{counted(int(tracks['segment_count'].sum()), 'segment')}, "
-            f"{tracks['length_m'].sum() / 1000:.2f} km, heading {heading}"
-        )
+        facts = [
+            counted(len(tracks), "track"),
+            counted(int(tracks["segment_count"].sum()), "segment"),
+            f"{tracks['length_m'].sum() / 1000:.2f} km",
+        ]
+        if math.isfinite(field["heading_deg"]):  # of imported tracks nobody recorded it
+            facts.append(f"heading {heading_in_words(field['heading_deg'])}\N{DEGREE SIGN}")
+        lines.append(", ".join(facts))
     return lines
 
 

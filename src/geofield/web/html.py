@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import html
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +34,7 @@ from geofield.web.view import (
     tracks_view,
 )
 
+_UNRECORDED = dict.fromkeys(("heading_deg", "spacing_m", "step_m"), math.nan)
 #: Long side of the picture in the file, pixels.
 LONG_SIDE_PX = 1600
 
@@ -122,11 +124,13 @@ def plan_values(dataset: Dataset, scene: Scene | None = None) -> dict[str, Any]:
     if polygon.geom_type == "MultiPolygon":
         polygon = max(polygon.geoms, key=lambda part: part.area)
     evidence = dataset.provenance.evidence
-    tracks = None
-    if Tracks.lie_in(dataset.tables, evidence):
-        tracks = Tracks.from_tables(
-            dataset.tables, evidence["tracks"], grid=dataset.grid, outline=polygon
-        )
+    recorded, tracks = evidence.get("tracks"), None
+    if recorded or dataset.has(schema.SEGMENTS.name):
+        names = (schema.TRACKS.name, schema.SEGMENTS.name, schema.GAPS.name)
+        tables = {**dataset.tables, **{name: dataset.table(name) for name in names}}
+        # Of tracks that were imported nobody recorded how they were planned.
+        outline = polygon if recorded else None
+        tracks = Tracks.from_tables(tables, recorded or _UNRECORDED, outline=outline)
     picture, bounds = _picture(dataset, scene)
     bounds = bounds or margin_bounds(polygon)
     doubts = row["doubts"]

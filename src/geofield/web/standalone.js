@@ -69,8 +69,8 @@ map.on("pointermove", ({coordinate}) => {
 
 const f = plan.figures;
 const facts = [["area", `${number(plan.area_ha, 2)} ha`]];
-if (f.tracks !== undefined) facts.push(["length", `${f.tracks} · ${number(f.length_m / 1000, 2)} km`], ["coverage", `${number(f.coverage_percent, 1)} %`],
-  ["heading", heading(f.heading_deg)]);
+if (f.tracks !== undefined) facts.push(["length", `${f.tracks} · ${number(f.length_m / 1000, 2)} km`]);
+if (f.heading_deg != null) facts.push(["coverage", `${number(f.coverage_percent, 1)} %`], ["heading", heading(f.heading_deg)]);
 if (f.turns) facts.push(["turns", String(f.turns)]);
 if (plan.obstacles.length) {
   // Those that tracks go around; the others are no obstacles to a driver.
