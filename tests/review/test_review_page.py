@@ -485,6 +485,25 @@ def test_a_tool_that_was_taken_before_the_answer_is_kept(page: Page) -> None:
     assert page.state()["obstacles"][-1]["status"] == "added"
 
 
+def test_a_size_that_was_dragged_is_kept_by_the_next_drag(page: Page) -> None:
+    """The second one begins where the first one ended, and not where the last answer was."""
+    page.run("document.querySelector('#list [data-no=\"8\"]').click()")
+    time.sleep(0.3)
+    before, (_, metre) = page.obstacle(8), page.view()
+    x, y = before["centre"]
+    corner = x + before["radius_m"] + before["buffer_m"]
+    page.driver.execute_cdp_cmd("Network.enable", {})
+    slow = {"offline": False, "latency": 1500, "downloadThroughput": -1, "uploadThroughput": -1}
+    page.driver.execute_cdp_cmd("Network.emulateNetworkConditions", slow)
+    for _ in range(2):
+        page.drag((corner, y), (corner + 20 * metre, y), steps=2)
+        corner += 20 * metre
+    page.driver.execute_cdp_cmd("Network.emulateNetworkConditions", {**slow, "latency": 0})
+    page.wait(lambda: page.obstacle(8)["radius_m"] > before["radius_m"] + 30 * metre)
+    wider = page.obstacle(8)["radius_m"] - before["radius_m"]
+    assert wider == pytest.approx(40 * metre, abs=3 * metre)
+
+
 def reject_and_kill(page: Page, process: subprocess.Popen[str]) -> None:
     """Reject the first obstacle, and end the server as a power cut does."""
     page.press("j", "r")

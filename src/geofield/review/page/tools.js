@@ -187,14 +187,15 @@ function resizer() {
   const translate = new ol.interaction.Translate({
     layers: layer => layer.getSource() === maps.sources.handle, hitTolerance: reach,
   });
-  // Wherever the hand took the square, its way counts.
-  let row = null, grip = 0, dragged = false;
+  // Wherever the hand took the square, its way counts; what is shown may be ahead of the answer.
+  let row = null, grip = 0, before_m = 0, dragged = false;
   const away = ([x, y]) => Math.hypot(x - row.centre[0], y - row.centre[1]);
   const command = ({coordinate}) => ({do: "radius", no: row.no,
-    radius_m: Math.max(0.3, Math.round((row.radius_m + (away(coordinate) - grip) * desk.scale()) * 1000) / 1000)});
-  translate.on("translatestart", ({coordinate}) => {
+    radius_m: Math.max(0.3, Math.round((before_m + (away(coordinate) - grip) * desk.scale()) * 1000) / 1000)});
+  translate.on("translatestart", ({coordinate, features}) => {
     row = desk.row(desk.chosen());
     grip = away(coordinate);
+    before_m = away(features.item(0).getGeometry().getCoordinates()) - row.buffer_m;
     dragged = false;
   });
   translate.on("translating", event => {
