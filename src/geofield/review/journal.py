@@ -95,9 +95,11 @@ class Journal:
         whole = self._kept + self._rest
         unsaved = done = 0
         begin = self._entries[0][1] if self._entries else 0
+        last = max((end for entry, end in self._entries if "saved" in entry), default=0)
         for entry, end in self._entries[1:]:
             if "saved" in entry:
-                session.mark_saved(session.whole())
+                if end == last:  # this one lies in the file
+                    session.mark_saved(session.whole())
                 unsaved, begin = 0, end
                 continue
             try:

@@ -9,16 +9,13 @@ from geofield.review.session import Session
 from geofield.settings import Settings
 from geofield.web.view import obstacles_view, outline_view, rings_of, tracks_view
 
-#: As the panel in QGIS says it.
-ROUTE_WAITS = "The route is planned anew when the edits are saved."
-
 
 def state_of(session: Session) -> dict[str, Any]:
     """All that the page shows of a session and that an edit may change."""
-    plan, step = session.plan, session.step
-    waits = (ROUTE_WAITS,) if step.waits else ()
+    plan = session.plan
     return {
-        **tracks_of(plan, (*waits, *step.notes)),
+        **tracks_of(plan, session.step.notes),
+        "route_waits": session.step.waits,
         "name": plan.field.name,
         "field_id": plan.field.field_id,
         "crs": plan.field.crs.name,

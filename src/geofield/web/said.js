@@ -59,7 +59,6 @@ export const SAID = {
     [/^Beside its track a machine of (.*) m reaches (.*) m into obstacles: .*$/, "Neben ihrer Spur reicht eine Maschine von $1 m Breite $2 m weit in Hindernisse."],
     [/^Obstacles or the border cut the field into parts: 1 way .*$/, "Hindernisse oder der Rand teilen das Feld: 1 Weg zwischen Abschnitten gibt es nicht, und der Fahrweg lässt ihn aus."],
     [/^Obstacles or the border cut the field into parts: (\d+) ways .*$/, "Hindernisse oder der Rand teilen das Feld: $1 Wege zwischen Abschnitten gibt es nicht, und der Fahrweg lässt sie aus."],
-    [/^The route is planned anew when the edits are saved\.$/, "Der Fahrweg wird beim Speichern neu geplant."],
     [/^Of (\d+) tracks (\d+) cannot be left out at a turn: .*$/, "Von $1 Spuren lässt sich beim Wenden nicht jeweils $2 auslassen: auf jede folgt die nächste."],
     [/^So narrow a spacing would give about (.*) pieces of track; .*$/, "Ein so enger Abstand ergäbe etwa $1 Spurstücke: mehr, als geplant werden."],
     [/^Give the spacing in metres, for instance 3, .*$/, "Geben Sie den Abstand in Metern an, zum Beispiel 3."],

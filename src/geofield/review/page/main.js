@@ -122,7 +122,8 @@ function showTracks(answer, moving = false) {
   const f = answer.figures;
   if (f.tracks === undefined) return;
   const unfit = f.turns_that_do_not_fit ? ` · ${t("unfit", {n: f.turns_that_do_not_fit})}` : "";
-  $("figures").textContent = `${number(f.area_ha, 2)} ha · ${t(f.tracks === 1 ? "one_track" : "n_tracks", {n: f.tracks})} · ${number(f.length_m / 1000, 2)} km · ${t("covered", {p: number(f.coverage_percent, 1)})}${unfit}`;
+  const waits = answer.route_waits ?? state.settings.route !== "none" ? ` · ${t("route_waits")}` : "";
+  $("figures").textContent = `${number(f.area_ha, 2)} ha · ${t(f.tracks === 1 ? "one_track" : "n_tracks", {n: f.tracks})} · ${number(f.length_m / 1000, 2)} km · ${t("covered", {p: number(f.coverage_percent, 1)})}${unfit}${waits}`;
   const facts = [["area", `${number(f.area_ha, 4)} ha`], ["length", `${f.tracks} (${f.segments}), ${number(f.length_m)} m`],
     ["coverage", `${number(f.coverage_percent, 1)} %`], ["overlap", `${number(f.overlap_percent, 1)} %`],
     ["heading", heading(f.heading_deg)], ["lost_all", `${number(f.lost_m)} m`]];
