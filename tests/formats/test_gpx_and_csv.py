@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import geopandas as gpd
@@ -158,3 +159,26 @@ def test_a_boundary_is_found_among_empty_layers(tmp_path: Path) -> None:
     picture = Path(__file__).parents[2] / "sample_data" / "field_1.tif"
     done = geofield("field", picture, "--boundary", walk, "-o", tmp_path / "a.gpkg")
     assert "no polygon" not in done.stderr
+
+
+def test_obstacles_of_unknown_size_are_not_driven_through(tmp_path: Path) -> None:
+    """A GPX has their places alone: where they stand is no fault of its lines."""
+    dataset = make_dataset()
+    line = dataset.table("segments").geometry.iloc[0].centroid
+    beside = shapely.box(line.x - 20, line.y + 0.3, line.x + 20, line.y + 0.6)
+    fence = dataset.table("obstacles").iloc[:1].assign(radius_m=np.nan, status="confirmed")
+    tables = {**dataset.tables, "obstacles": fence.set_geometry([beside], crs=dataset.crs)}
+    write_dataset(replace(dataset, tables=tables), tmp_path, ["gpx"], tell_drops=False)
+    done = geofield("validate", tmp_path / "field.gpx")
+    assert (done.returncode, "runs through" in done.stdout) == (0, False), done.stdout
+
+
+def test_a_walk_round_a_pond_is_what_stands_in_the_field(tmp_path: Path) -> None:
+    pond = [(9.0005, 50.0005), (9.0007, 50.0005), (9.0007, 50.0006), (9.0005, 50.0006)]
+    line = [(9.0001, 50.0002), (9.0019, 50.0002)]
+    once = [(9.0001, 50.0002)]  # a recording that was stopped at once
+    walks = gpx(tmp_path / "a.gpx", [*pond, pond[0]], [*WALK, WALK[0], (9.0001, 50.0)], line, once)
+    rows, said = imported(tmp_path, walks)
+    assert (rows["field"], rows["obstacles"], rows["tracks"]) == (1, 1, 1)
+    assert "2 lines end where they began: they are taken as areas" in said
+    assert "1 polygon inside it taken as obstacles" in said

@@ -121,7 +121,8 @@ def _of_content(
         for each in heard
         if isinstance(each, FormatWarning)
     ]
-    with_segments = "segments" in found.layers
+    # Where there is no outline, obstacles are mere places: of unknown size, as in GPX.
+    with_segments = {"field", "segments"} <= set(found.layers)
     for one in fields:
         of_one = check_dataset(one, with_segments=with_segments)
         findings += [_in_field(one.name, each) if len(fields) > 1 else each for each in of_one]
