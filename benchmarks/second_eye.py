@@ -25,7 +25,7 @@ import pandas as pd
 import shapely
 
 from common import DATA, machine, write_page
-from field_unseen import AIM, GOOD, MOST_CLICKS, another, ours
+from field_unseen import AIM, GOOD, MOST_CLICKS, Point, another, ours
 from geofield.evaluation import match_points
 from geofield.imagery import read_scene
 from obstacles_land import BALANCED, KINDS, found_in, with_bands
@@ -53,14 +53,19 @@ class Twice:
 
 def drawn_twice() -> Iterator[Twice]:
     """The fields that two drawings were made of."""
-    with (HERE / "field_labels_again.csv").open(newline="", encoding="utf-8") as file:
-        table = list(csv.DictReader(file))
+    table = rows_of("field_labels_again.csv")
     rows = {key(row["image"], row["seed_x_px"], row["seed_y_px"]): row for row in table}
     for case in labelled():
         row = rows.get(key(case.name.split()[1], case.x_px, case.y_px))
         if row:
             other = row["polygon_alt_px"]
             yield Twice(case, polygon(row["polygon_px"]), polygon(other) if other else None)
+
+
+def rows_of(name: str) -> list[dict[str, str]]:
+    """The rows of a table beside this file."""
+    with (HERE / name).open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
 
 
 def key(image: str, x_px: float | str, y_px: float | str) -> tuple[str, float, float]:
@@ -154,7 +159,8 @@ def clicks(cases: list[Case]) -> list[str]:
 
 def clicked(case: Case) -> list[list[float]]:
     """Overlaps beside each of `BESIDE_PX` after one point, two, ... where most is wrong."""
-    include, exclude = [(case.x_px, case.y_px)], []
+    include: list[Point] = [(case.x_px, case.y_px)]
+    exclude: list[Point] = []
     run = ours(case)
     overlaps: list[list[float]] = []
     for _ in range(MOST_CLICKS):
@@ -191,13 +197,13 @@ def marked_twice() -> Iterator[tuple[Trees, np.ndarray]]:
     """Windows of the sites left out: their labelled trees, and those of the second eye."""
     folder = DATA / "trees_train"
     labels = pd.read_csv(folder / "trees.csv")
-    for row in pd.read_csv(HERE / "tree_labels_again.csv").itertuples():
-        right, bottom = row.left_px + WINDOW_PX, row.top_px + WINDOW_PX
-        window = shapely.box(row.left_px, row.top_px, right, bottom)
-        labelled_xy = labels.loc[labels.image == row.image, ["x_px", "y_px"]].to_numpy(float) + 0.5
-        seen = np.array(json.loads(row.trees_px), float).reshape(-1, 2)
-        scene = read_scene(folder / f"{row.image}.tif")
-        inside, counted = (xy[shapely.contains_xy(window, *xy.T)] for xy in (labelled_xy, seen))
+    for row in rows_of("tree_labels_again.csv"):
+        left, top = float(row["left_px"]), float(row["top_px"])
+        window = shapely.box(left, top, left + WINDOW_PX, top + WINDOW_PX)
+        here = labels.loc[labels.image == row["image"], ["x_px", "y_px"]].to_numpy(np.float64) + 0.5
+        seen = np.array(json.loads(row["trees_px"]), np.float64).reshape(-1, 2)
+        scene = read_scene(folder / f"{row['image']}.tif")
+        inside, counted = (xy[shapely.contains_xy(window, *xy.T)] for xy in (here, seen))
         yield Trees(scene, inside, window), counted
 
 
