@@ -83,7 +83,7 @@ def evaluate(
     """
     from geofield.evaluation import draw_matches, placed
     from geofield.evaluation import evaluate as compare
-    from geofield.farm.place_files import CSV
+    from geofield.formats.raw_tables import CSV
     from geofield.imagery.write import replacing
     from geofield.plan import read_plan
 
@@ -129,8 +129,8 @@ def evaluate(
 def _rows(path: Path, layer: str | None) -> gpd.GeoDataFrame:
     """The rows of any vector file, or of a table with positions."""
     from geofield.evaluation import read_obstacles
-    from geofield.farm.place_files import CSV
-    from geofield.farm.place_reader import read_table
+    from geofield.formats.raw_tables import CSV
+    from geofield.formats.table_positions import read_table
 
     if path.suffix.lower() in CSV:
         return read_table(path, None if layer == _USUAL else layer)

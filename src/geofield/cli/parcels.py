@@ -48,13 +48,13 @@ def parcel_and_point(
     if (lat is None) != (lon is None):
         raise _missing(lat)
     from geofield.crs import parse_crs
-    from geofield.farm.place_files import CSV
-    from geofield.farm.place_reader import read_table
     from geofield.field import field_from_boundary
     from geofield.formats.antimeridian import joined
     from geofield.formats.catalogue import PARQUET
     from geofield.formats.foreign import has_rows, layer_names, read_vector
     from geofield.formats.gpkg_read import is_own
+    from geofield.formats.raw_tables import CSV
+    from geofield.formats.table_positions import read_table
 
     in_layers = path.suffix.lower() not in CSV
     alone = path.suffix.lower() in (*CSV, *PARQUET)

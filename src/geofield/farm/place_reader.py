@@ -8,37 +8,27 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import geopandas as gpd
 import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 import shapely
-from numpy.typing import NDArray
 from pyproj import CRS
 
 from geofield import schema
-from geofield.angles import angle_of
-from geofield.crs import LONLAT, authority_name, parse_crs, refuse_outside, transformer
+from geofield.crs import LONLAT, authority_name, parse_crs, transformer
 from geofield.datum import datum_notes
 from geofield.errors import CRSError, FormatError
-from geofield.farm.place_files import RawPlaces, raw_of, read_raw
 from geofield.farm.place_settings import check_settings, setting_names
 from geofield.farm.places import Places
 from geofield.formats.antimeridian import joined
-from geofield.formats.foreign import RawLayer, files_in, read_foreign
 from geofield.formats.foreign_tables import ID_COLUMNS, NAME_COLUMNS
-from geofield.model import Dataset
+from geofield.formats.raw_tables import RawTable, raw_of, read_raw
+from geofield.formats.table_positions import LAT, LON, check_positions, degrees, found
 from geofield.model.place import position_words
 from geofield.settings import Settings
-from geofield.wording import cell_text, counted, nearest, some_of, unlike
+from geofield.wording import cell_text, counted, unlike
 
-_LAT = ("lat", "latitude")
-_LON = ("lon", "lng", "long", "longitude")
-_X = ("x", "easting", "east", "rechtswert")
-_Y = ("y", "northing", "north", "hochwert")
-#: What tables have where a number is missing.
-_MISSING = ("", "na", "n/a", "nan", "null")
 _BATCH = 50_000
 
 
@@ -80,8 +70,8 @@ def read_places(
         raise FormatError(f"{where} is empty: it holds no places.", hint="Give one row per field.")
     # What geofield wrote beside the names of its own outlines is no word of the user's.
     raw = replace(raw, table=raw.table.select(schema.of_others(raw.table.column_names)))
-    id_name, name_name = _found(raw, id_column, ID_COLUMNS), _found(raw, name_column, NAME_COLUMNS)
-    lat_name, lon_name = _found(raw, lat_column, _LAT), _found(raw, lon_column, _LON)
+    id_name, name_name = found(raw, id_column, ID_COLUMNS), found(raw, name_column, NAME_COLUMNS)
+    lat_name, lon_name = found(raw, lat_column, LAT), found(raw, lon_column, LON)
     notes: list[str] = []
     kept = np.arange(raw.table.num_rows)
     outlines, part = None, np.zeros(raw.table.num_rows, dtype=np.int64)
@@ -91,7 +81,7 @@ def read_places(
         kept, part, outlines, lat, lon = _shapes(raw, raw.geometry, source, notes)
         used = {id_name, name_name, raw.geometry_name}
     elif lat_name and lon_name:
-        lat, lon = _degrees(raw, lat_name, "NS"), _degrees(raw, lon_name, "EW")
+        lat, lon = degrees(raw, lat_name, "NS"), degrees(raw, lon_name, "EW")
         used = {id_name, name_name, lat_name, lon_name}
     else:
         raise FormatError(
@@ -99,7 +89,7 @@ def read_places(
             hint=f"It has {', '.join(raw.table.column_names)}; name them with --lat-column and "
             "--lon-column.",
         )
-    _check_positions(raw, lat, lon, kept, source)
+    check_positions(raw, lat, lon, kept, source)
     rest = [name for name in raw.table.column_names if name not in used]
     per_place = [name for name in rest if name in setting_names()]
     own = _plain(raw.table.select([name for name in rest if name not in per_place])).take(kept)
@@ -111,53 +101,6 @@ def read_places(
         own.rename_columns(schema.own_names(schema.FIELD, own.column_names)),
         said, tuple(notes), ids_given=id_name is not None,
     )  # fmt: skip
-
-
-def read_table(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
-    """The rows of a CSV table: shapes as WKT, or points by columns lat and lon, or x and y.
-
-    What are no degrees is of no CRS: a table cannot say it. Nor has it a `layer`.
-
-    Raises
-    ------
-    FormatError
-        When there are no such columns, or positions are no positions.
-    """
-    raw = read_raw(path, layer=layer, texts=())
-    if raw.geometry is not None:
-        shapes = shapely.from_wkb(raw.geometry.to_numpy(zero_copy_only=False))
-        west, south, east, north = shapely.total_bounds(shapes)
-        in_degrees = max(-west, east) <= 180.0 and max(-south, north) <= 90.0
-        frame = raw.table.to_pandas()
-        return gpd.GeoDataFrame(frame, geometry=shapes, crs=LONLAT if in_degrees else None)
-    lonlat = _found(raw, None, _LON), _found(raw, None, _LAT)
-    names = lonlat if None not in lonlat else (_found(raw, None, _X), _found(raw, None, _Y))
-    if None in names:
-        raise FormatError(
-            f"{raw.name} has no columns lat and lon and no geometry.",
-            hint=f"It has {', '.join(raw.table.column_names)}; rename them to lat and lon.",
-        )
-    if names != lonlat:
-        x, y = (_numbers(raw, str(name)) for name in names)
-    else:
-        x, y = (_degrees(raw, str(name), of) for name, of in zip(names, ("EW", "NS"), strict=True))
-        if len(x):
-            _check_positions(raw, y, x, np.arange(len(x)), LONLAT)
-    known = np.isfinite(x) & np.isfinite(y)
-    points = np.full(len(x), None)
-    points[known] = shapely.points(x[known], y[known])
-    crs = LONLAT if names == lonlat else None
-    # Those of our own tables stay.
-    rest = raw.table.drop_columns(
-        [each for each in names if each not in ("lat", "lon")]
-    ).to_pandas()
-    return gpd.GeoDataFrame(rest, geometry=points, crs=crs)
-
-
-def read_csv(path: Path, *, crs: CRS | None = None) -> Dataset:
-    """The dataset in a table of shapes or positions, or in a folder of some."""
-    tables = [RawLayer(file.stem, read_table(file)) for file in files_in(path, ".csv", ".tsv")]
-    return read_foreign(tables, path, crs=crs)
 
 
 def _plain(table: pa.Table) -> pa.Table:
@@ -174,21 +117,7 @@ def _as_json(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False, default=str)
 
 
-def _found(raw: RawPlaces, asked: str | None, usual: Sequence[str]) -> str | None:
-    """The column that was asked for, or one with a usual name."""
-    names = raw.table.column_names
-    if asked is None:
-        by_name = {name.lower(): name for name in reversed(names)}
-        return next((by_name[name] for name in usual if name in by_name), None)
-    if asked not in names:
-        raise FormatError(
-            f"{raw.name} has no column {asked!r}.{nearest(asked, names)}",
-            hint=f"It has {', '.join(names)}.",
-        )
-    return asked
-
-
-def _crs_of(raw: RawPlaces, crs: str | None) -> CRS:
+def _crs_of(raw: RawTable, crs: str | None) -> CRS:
     if raw.crs is None and crs is None and raw.in_degrees:
         return LONLAT
     if raw.crs is None and crs is None:
@@ -205,7 +134,7 @@ def _crs_of(raw: RawPlaces, crs: str | None) -> CRS:
     return given if own is None else own  # type: ignore[return-value]
 
 
-def _shapes(raw: RawPlaces, geometry: pa.Array, source: CRS, notes: list[str]) -> tuple[Any, ...]:
+def _shapes(raw: RawTable, geometry: pa.Array, source: CRS, notes: list[str]) -> tuple[Any, ...]:
     """The rows that are places, the part of the row, outlines, latitudes and longitudes."""
     kept, part, outlines, xs, ys, other = [], [], [], [], [], 0
     for begin in range(0, len(geometry), _BATCH):
@@ -257,7 +186,7 @@ def _shapes(raw: RawPlaces, geometry: pa.Array, source: CRS, notes: list[str]) -
     return rows, parts, every if every.null_count < len(every) else None, lat, lon
 
 
-def _refuse_degrees(raw: RawPlaces, source: CRS, x: Any, y: Any) -> None:
+def _refuse_degrees(raw: RawTable, source: CRS, x: Any, y: Any) -> None:
     """Refuse degrees that a file calls metres: all its places would lie off the coast of Africa."""
     known = np.isfinite(x) & np.isfinite(y)
     if source.is_projected and known.any() and (np.hypot(x, y)[known] < 200.0).all():
@@ -268,68 +197,8 @@ def _refuse_degrees(raw: RawPlaces, source: CRS, x: Any, y: Any) -> None:
         )
 
 
-def _degrees(raw: RawPlaces, name: str, letters: str) -> NDArray[np.float64]:
-    """A column's latitudes or longitudes, which may be written as for the options."""
-    try:
-        return _numbers(raw, name)
-    except FormatError:
-        texts = [(text or "").strip() for text in raw.table[name].to_pylist()]
-        angles = [np.nan if text.lower() in _MISSING else angle_of(text, letters) for text in texts]
-        if None in angles:
-            raise
-        return np.array(angles, dtype=np.float64)
-
-
-def _numbers(raw: RawPlaces, name: str) -> NDArray[np.float64]:
-    """A column's numbers; missing ones are not a number."""
-    column = raw.table[name]
-    try:
-        if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
-            column = pc.utf8_trim_whitespace(column)
-            column = pc.if_else(pc.equal(column, ""), None, column)
-        return np.asarray(column.cast(pa.float64()).to_numpy(), dtype=np.float64)
-    except pa.ArrowInvalid as error:
-        raise FormatError(
-            f"{raw.name}: column {name!r} holds something that is no number ({error}).",
-            hint="Write degrees as 35.0754 or 35 4.524 N.",
-        ) from None
-
-
-def _check_positions(raw: RawPlaces, lat: Any, lon: Any, row: Any, source: CRS) -> None:
-    """Refuse what cannot be a latitude or longitude; `row` counts from 0, `source` is the file's.
-
-    Raises
-    ------
-    FormatError
-        Saying whether the two look swapped, or some rows are in another CRS.
-    """
-    if (np.isnan(lat) | np.isnan(lon)).all():
-        raise FormatError(
-            f"{raw.name} holds no row with a position.",
-            hint="Give each field a latitude and a longitude, or a shape.",
-        )
-    wrong = np.flatnonzero((np.abs(lat) > 90) | (np.abs(lon) > 180))
-    if not len(wrong):
-        return
-    rows = dict.fromkeys(row[wrong] + 1)
-    shown = some_of([str(one) for one in rows], 5)
-    refuse_outside(source, lat[wrong], lon[wrong], what=f"{raw.name}: coordinates in row {shown}")
-    first = f"lat {lat[wrong[0]]:g}, lon {lon[wrong[0]]:g}"
-    swapped = (np.abs(lat[wrong]) <= 180) & (np.abs(lon[wrong]) <= 90)
-    if swapped.all():
-        what = (
-            "the columns' names" if raw.geometry is None else "them in the file (`ogr2ogr -swapXY`)"
-        )
-        hint = f"Latitude and longitude look swapped: exchange {what}."
-    elif len(wrong) < len(lat):
-        hint = "Other rows are degrees: these may be in another CRS. Bring all rows into one."
-    else:
-        hint = "Give degrees (WGS 84), or a vector file that says its CRS."
-    raise FormatError(f"{raw.name}: no position on earth in row {shown} ({first}).", hint=hint)
-
-
 def _names(
-    raw: RawPlaces, id_name: str | None, name_name: str | None, unnamed: str | None,
+    raw: RawTable, id_name: str | None, name_name: str | None, unnamed: str | None,
     kept: Any, part: Any, lat: Any, lon: Any,
 ) -> tuple[pa.Array, pa.Array]:  # fmt: skip
     """Ids and names of all places; those without a name go by `unnamed` and their row, or their id.

@@ -18,8 +18,6 @@ from geofield.crs import LONLAT, parse_crs
 from geofield.errors import CRSError, FormatError, TrackError
 from geofield.farm.folder import read_parts
 from geofield.farm.layers import GEOMETRY
-from geofield.farm.place_files import CSV
-from geofield.farm.place_reader import read_table
 from geofield.farm.store import Store
 from geofield.finite import refuse_nowhere
 from geofield.formats.antimeridian import unwrapped
@@ -33,6 +31,8 @@ from geofield.formats.foreign_tables import (
     obstacle_table,
 )
 from geofield.formats.gpkg_read import is_own
+from geofield.formats.raw_tables import CSV
+from geofield.formats.table_positions import read_table
 from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M
 from geofield.model.review import reconcile
 from geofield.model.written import (

@@ -177,7 +177,7 @@ CATALOGUE: tuple[Format, ...] = (
         ("csv/track_points.csv", "csv/obstacles.csv"),
         ("track_points", "obstacles"),
         "geofield.formats.tables_csv:write",
-        "geofield.farm.place_reader:read_csv",
+        "geofield.formats.table_positions:read",
         suffixes=(".csv", ".tsv"),
         precision_m=0.0002,
         asks_crs=True,

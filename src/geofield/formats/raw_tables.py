@@ -1,4 +1,4 @@
-"""Reading files of places into Arrow: CSV, Parquet, and whatever GDAL reads."""
+"""Files of rows read into Arrow: CSV, Parquet, and whatever GDAL reads."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ import pyarrow.compute as pc
 import shapely
 
 from geofield.errors import CRSError, FormatError
-from geofield.farm.row_crs import refuse_other_rows
 from geofield.formats.catalogue import PARQUET
 from geofield.formats.foreign import refuse_layer
+from geofield.formats.row_crs import refuse_other_rows
 from geofield.strangers import check_vector, unreadable
 from geofield.wording import nearest
 
@@ -31,7 +31,7 @@ _GEOMETRY = ("geometry", "geom", "wkt", "the_geom")
 
 
 @dataclass(frozen=True, slots=True)
-class RawPlaces:
+class RawTable:
     """A file of places as it is."""
 
     #: For people.
@@ -47,7 +47,7 @@ class RawPlaces:
     in_degrees: bool = False
 
 
-def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> RawPlaces:
+def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> RawTable:
     """A file of places; `layer` is needed where it has several.
 
     `texts` are columns that are text whatever they look like: 007 is no 7.
@@ -70,7 +70,7 @@ def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> R
     return _vector(path, layer)
 
 
-def raw_of(frame: pd.DataFrame) -> RawPlaces:
+def raw_of(frame: pd.DataFrame) -> RawTable:
     """A table of places that a Python user has."""
     name = "The table"
     shapes = frame.geometry if isinstance(frame, gpd.GeoDataFrame) else None
@@ -87,12 +87,12 @@ def raw_of(frame: pd.DataFrame) -> RawPlaces:
     unnamed = [each for each in table.column_names if each.startswith("__index_level_")]
     table = table.drop_columns(unnamed)
     if shapes is None:
-        return RawPlaces(name, table)
+        return RawTable(name, table)
     geometry = pa.array(shapely.to_wkb(shapes.to_numpy()), pa.binary(), from_pandas=True)
-    return RawPlaces(name, table, geometry, str(shapes.name), shapes.crs)
+    return RawTable(name, table, geometry, str(shapes.name), shapes.crs)
 
 
-def _csv(path: Path, texts: set[str]) -> RawPlaces:
+def _csv(path: Path, texts: set[str]) -> RawTable:
     import pyarrow.csv as table_csv
 
     try:
@@ -136,14 +136,14 @@ def _csv(path: Path, texts: set[str]) -> RawPlaces:
         table = table.set_column(names.index(name), name, pc.if_else(empty, None, table[name]))
     column = next((name for name in texts_in if name.lower() in _GEOMETRY), None)
     if column is None:
-        return RawPlaces(path.name, table)
+        return RawTable(path.name, table)
     wkt = table[column].to_numpy()
     shapes = shapely.from_wkt(wkt, on_invalid="ignore")
     geometry = pa.array(shapely.to_wkb(shapes), pa.binary(), from_pandas=True)
-    return RawPlaces(path.name, table.drop_columns(column), geometry, column, in_degrees=True)
+    return RawTable(path.name, table.drop_columns(column), geometry, column, in_degrees=True)
 
 
-def _parquet(path: Path) -> RawPlaces:
+def _parquet(path: Path) -> RawTable:
     import pyarrow.parquet as pq
 
     try:
@@ -157,7 +157,7 @@ def _parquet(path: Path) -> RawPlaces:
     table = table.cast(pa.schema(plain))
     name = geo.get("primary_column")
     if name not in table.column_names:
-        return RawPlaces(path.name, table)
+        return RawTable(path.name, table)
     column = geo["columns"][name]
     if column.get("encoding") != "WKB":
         raise FormatError(
@@ -170,10 +170,10 @@ def _parquet(path: Path) -> RawPlaces:
     rest = table.drop_columns([each for each in {name, boxes} if each in table.column_names])
     if isinstance(crs, dict):
         crs = json.dumps(crs)
-    return RawPlaces(path.name, rest, geometry, name, crs)
+    return RawTable(path.name, rest, geometry, name, crs)
 
 
-def _vector(path: Path, layer: str | None) -> RawPlaces:
+def _vector(path: Path, layer: str | None) -> RawTable:
     import pyogrio
     from pyogrio.errors import DataLayerError, DataSourceError
 
@@ -207,11 +207,11 @@ def _vector(path: Path, layer: str | None) -> RawPlaces:
     name = meta["geometry_name"] or "wkb_geometry"
     table = table.replace_schema_metadata(None)
     if name not in table.column_names:
-        return RawPlaces(path.name, table)
+        return RawTable(path.name, table)
     geometry = table[name].combine_chunks()
     if _is_curved(geometry):  # only here GDAL makes lines of arcs
         geometry = pa.array(pyogrio.raw.read(path, layer=layer, columns=[])[2], pa.binary())
-    return RawPlaces(path.name, table.drop_columns(name), geometry, name, meta["crs"])
+    return RawTable(path.name, table.drop_columns(name), geometry, name, meta["crs"])
 
 
 def _is_curved(geometry: pa.Array) -> bool:
