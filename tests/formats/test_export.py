@@ -216,8 +216,11 @@ def test_missing_and_unknown_files(tmp_path):
     with pytest.raises(FormatError, match="no file"):
         read_dataset(tmp_path / "nothing.gpkg")
     (tmp_path / "x.abc").write_text("?")
-    with pytest.raises(FormatError, match="is not known"):
+    with pytest.raises(FormatError, match="is not known") as told:
         read_dataset(tmp_path / "x.abc")
+    # What is only written is no way out.
+    assert ".dxf" not in str(told.value)
+    assert "ogr2ogr NAME.gpkg FILE" in str(told.value)
     (tmp_path / "x.tif").write_bytes(b"II*\0")
     with pytest.raises(FormatError, match=r"x.tif is a picture") as told:
         read_dataset(tmp_path / "x.tif")

@@ -287,3 +287,16 @@ def test_columns_of_imported_lines_are_of_the_tracks_too(tmp_path):
     write_with = replace(plan, tables=tables)
     assert dropped(write_with, FORMATS["kml"])[-1] == "columns of your own in segments"
     assert "columns of your own in tracks" in dropped(write_with, FORMATS["shapefile"])
+
+
+def test_files_of_a_folder_that_are_not_read_are_told(tmp_path):
+    """Of a stick with a boundary and trees of two formats only one was read, without a word."""
+    folder = tmp_path / "stick"
+    folder.mkdir()
+    write(folder / "boundary.shp", [BOX])
+    write(folder / "trees.geojson", TREES)
+    found, said, _ = imported(tmp_path, folder)
+    assert found["rows"] == {"obstacles": 3}
+    assert "nothing else: boundary.shp must be named" in said
+    found, said, _ = imported(tmp_path, folder, folder / "boundary.shp", "--overwrite")
+    assert found["rows"] == {"field": 1, "obstacles": 3}

@@ -13,12 +13,14 @@ from pyproj import CRS
 
 from geofield import schema
 from geofield.crs import parse_crs
-from geofield.errors import FormatError
+from geofield.errors import FormatError, FormatWarning
 from geofield.formats.foreign_tables import obstacle_table
-from geofield.formats.registry import detect, product_file
+from geofield.formats.registry import detect, passed_over, product_file
 from geofield.formats.zipped import unpacked
 from geofield.model import Dataset
 from geofield.model.review import reconcile
+from geofield.notes import warn
+from geofield.wording import some_of
 
 
 def read_dataset(path: Path | str, *, crs: CRS | str | None = None) -> Dataset:
@@ -46,6 +48,13 @@ def read_dataset(path: Path | str, *, crs: CRS | str | None = None) -> Dataset:
             points = {schema.TRACK_POINTS.name: inside.table(schema.TRACK_POINTS.name)}
             return replace(inside, tables={**inside.tables, **points}, points=None)
     found = detect(place)
+    if place.is_dir() and (others := passed_over(place, found)):
+        warn(
+            f"Of {place} all {found.title} files are read, and nothing else: "
+            f"{some_of(others, 5)} must be named to be read, too.",
+            FormatWarning,
+            stacklevel=2,
+        )
     place = product_file(place, found)
     reader = found.load_reader()
     if crs is None:

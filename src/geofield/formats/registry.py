@@ -20,6 +20,9 @@ _TASK_DATA = b"ISO11783_TaskData"
 #: Every format by its name.
 FORMATS: Mapping[str, Format] = MappingProxyType({each.name: each for each in CATALOGUE})
 
+#: What a file is called that some format reads.
+_READ = {suffix for each in CATALOGUE if each.reader for suffix in each.suffixes}
+
 
 def format_named(name: str) -> Format:
     """The format of a name.
@@ -72,7 +75,8 @@ def detect(path: Path | str) -> Format:
     check_vector(place)
     raise FormatError(
         f"The format of {place} is not known.",
-        hint=f"Known: {', '.join(sorted(s for f in FORMATS.values() for s in f.suffixes))}.",
+        hint=f"Read are {', '.join(sorted(_READ))}. Of what else GDAL reads, `ogr2ogr NAME.gpkg "
+        "FILE` makes a GeoPackage.",
     )
 
 
@@ -92,6 +96,14 @@ def product_file(place: Path, found: Format) -> Path:
             f"{place} holds {len(files)} {found.title} files.", hint="Name one of them."
         )
     return files[0]
+
+
+def passed_over(folder: Path, found: Format) -> list[str]:
+    """The files of a folder that other formats than the one found read; beside a plan, none."""
+    if found.name == "gpkg":
+        return []  # they are its products
+    others = _READ - set(found.suffixes)
+    return sorted(file.name for file in folder.iterdir() if file.suffix.lower() in others)
 
 
 def _detect_folder(folder: Path) -> Format:
