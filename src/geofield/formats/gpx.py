@@ -18,7 +18,7 @@ from geofield import schema
 from geofield.formats.antimeridian import unwrapped
 from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_vector
-from geofield.formats.origin import imagery_day, lineage
+from geofield.formats.origin import lineage
 from geofield.formats.terminal import avoided
 from geofield.formats.xml import node, write_xml
 from geofield.model import Dataset
@@ -43,7 +43,7 @@ _SAID = (
 
 def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
     """Write ``{stem}.gpx``."""
-    day = imagery_day(dataset)
+    day = dataset.provenance.source.day
     metadata = [node("name", dataset.name), node("desc", lineage(dataset))]
     metadata += [node("time", f"{day}T00:00:00Z")] if day is not None else []
     about = {

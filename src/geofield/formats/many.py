@@ -19,7 +19,6 @@ from geofield.crs import LONLAT, PACIFIC, metric_crs, reproject, transformer
 from geofield.errors import FormatError
 from geofield.formats.antimeridian import seamless
 from geofield.formats.names import safe_name
-from geofield.formats.origin import imagery_day
 from geofield.model import Dataset, Provenance
 from geofield.model.lost_numbers import numbered
 from geofield.wording import unlike
@@ -193,7 +192,7 @@ def owner_of(dataset: Dataset, options: Mapping[str, Any]) -> tuple[str, str]:
 
 def last_imagery_day(datasets: Sequence[Dataset]) -> str | None:
     """The latest day of the imagery, ISO 8601; None where nobody knows any."""
-    return max(filter(None, map(imagery_day, datasets)), default=None)
+    return max(filter(None, (each.provenance.source.day for each in datasets)), default=None)
 
 
 def distinct(datasets: Sequence[Dataset]) -> list[Dataset]:

@@ -148,15 +148,10 @@ def lineage(dataset: Dataset) -> str:
     return "; ".join(word for word in words if word)
 
 
-def imagery_day(dataset: Dataset) -> str | None:
-    """The day of the imagery, ISO 8601; None where nobody knows it."""
-    return dataset.provenance.source.day
-
-
 def timestamp(dataset: Dataset) -> str:
     """The time stamped where a file must have one, so that a second run is identical.
 
     Midnight UTC of the imagery's day, ISO 8601. Where nobody knows that day it is the earliest
     that ZIP archives can say, as the tools of reproducible builds write it.
     """
-    return f"{imagery_day(dataset) or UNDATED}T00:00:00.000Z"
+    return f"{dataset.provenance.source.day or UNDATED}T00:00:00.000Z"

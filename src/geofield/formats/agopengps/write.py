@@ -17,7 +17,6 @@ from geofield.formats.agopengps.plane import FloatArray, LocalPlane, densified, 
 from geofield.formats.agopengps.read import HOLE
 from geofield.formats.arrow import exact_geometry, to_lonlat
 from geofield.formats.names import safe_name
-from geofield.formats.origin import imagery_day
 from geofield.formats.terminal import (
     are_bent,
     avoided,
@@ -52,7 +51,7 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
     rings = [polygon.exterior, *polygon.interiors]
     rings += [each.shape.exterior for each in terminal_obstacles(dataset, polygon)]
     files = {
-        "Field.txt": _field(dataset.name, plane, imagery_day(dataset)),
+        "Field.txt": _field(dataset.name, plane, dataset.provenance.source.day),
         "Boundary.txt": _boundary(_on_plane(rings, dataset, plane), step),
         "Headland.txt": _headland(main_field(dataset, polygon), rings, dataset, plane, step),
         "TrackLines.txt": _track_lines(dataset, plane),

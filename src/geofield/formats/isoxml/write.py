@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -46,28 +47,20 @@ _DOUBTED = " (check)"
 _SAME_DEG = 0.1
 
 
-def write_v4(
-    datasets: Sequence[Dataset], folder: Path, *, stem: str, options: Mapping[str, Any]
+def _write(
+    datasets: Sequence[Dataset],
+    folder: Path,
+    *,
+    stem: str,
+    options: Mapping[str, Any],
+    version: int,
 ) -> list[Path]:
-    """Write ``isoxml/TASKDATA/TASKDATA.XML``, version 4.3: one task file for all fields.
+    """Write ``TASKDATA/TASKDATA.XML`` in ``isoxml`` or ``isoxml-v3``: one file for all fields.
 
     Options: ``customer`` and ``farm``, names for the terminal where the field has no columns of
-    these names; ``zip`` (true: the folder TASKDATA in one archive); ``headland`` (``line``: its
-    inner edge as AgOpenGPS reads it, or ``strip``: the area).
+    these names; ``zip`` (true: the folder TASKDATA in one archive); of version 4 ``headland``
+    (``line``: its inner edge as AgOpenGPS reads it, or ``strip``: the area).
     """
-    return _written(datasets, folder, stem, 4, options)
-
-
-def write_v3(
-    datasets: Sequence[Dataset], folder: Path, *, stem: str, options: Mapping[str, Any]
-) -> list[Path]:
-    """Write ``isoxml-v3/TASKDATA/TASKDATA.XML``, version 3.3; options of :func:`write_v4`."""
-    return _written(datasets, folder, stem, 3, options)
-
-
-def _written(
-    datasets: Sequence[Dataset], folder: Path, stem: str, version: int, options: Mapping[str, Any]
-) -> list[Path]:
     name = "isoxml" if version == 4 else "isoxml-v3"
     below = folder / name
     path = below / "TASKDATA" / "TASKDATA.XML"
@@ -76,6 +69,12 @@ def _written(
         return [path]
     day = last_imagery_day(datasets)
     return [archived([path], folder / f"{stem}_{name}.zip", day=day, below=below)]
+
+
+#: Version 4.3.
+write_v4 = partial(_write, version=4)
+#: Version 3.3.
+write_v3 = partial(_write, version=3)
 
 
 def _task_data(datasets: Sequence[Dataset], version: int, options: Mapping[str, Any]) -> ET.Element:
