@@ -14,7 +14,7 @@ from shapely import box
 from geofield import theme
 from geofield.mapping import draw_map
 from geofield.mapping import fonts as map_fonts
-from geofield.model.map_words import figures_in_words
+from geofield.model.map_words import figures_in_words, round_length_m
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan
 from geofield.settings import load_settings
@@ -33,6 +33,11 @@ def plan(simulated: SimulatedField) -> Plan:
         scene=simulated.scene,
     )
     return run_tracks(plan, settings=load_settings(None, {"tracks": {"spacing_m": 8.0}}))
+
+
+@pytest.mark.parametrize("round_m", [1, 2, 5, 10, 20, 50, 1000])
+def test_a_scale_bar_is_as_long_as_fits(round_m: float) -> None:
+    assert round_length_m(round_m) == round_length_m(1.9 * round_m) == round_m
 
 
 def near(picture: Image.Image, x: float, y: float, colour: tuple[int, ...]) -> bool:

@@ -11,11 +11,12 @@ from changed_plans import Frame
 from pyproj import CRS
 from shapely.affinity import translate
 
+from geofield.errors import FormatWarning
 from geofield.grid import Grid
 from geofield.model.merge import Changes, merge
 from geofield.model.obstacles import from_circles_px
 from geofield.model.review import reconcile
-from geofield.model.written import Written
+from geofield.model.written import Written, free_number
 
 #: On the central meridian a metre is 2 pixels; the picture reaches beyond the field to all sides.
 GRID = Grid(500, 300, Affine(0.5, 0, 499_975, 0, -0.5, 5_600_125), CRS(32633))
@@ -133,3 +134,29 @@ def test_a_margin_typed_with_the_shape_that_it_makes_grows_it_once() -> None:
     after, _ = searched_again(before, edited, (30, 50, 4))
     assert after["radius_m"][1] == pytest.approx(before["radius_m"][0])
     assert after.geometry[1].equals_exact(wide.geometry[0], 1e-3)
+
+
+@pytest.mark.parametrize(
+    ("said", "stands"),
+    [
+        (("rejected", "confirmed"), "confirmed"),
+        (("confirmed", "rejected"), "confirmed"),
+        (("rejected", "possible"), "rejected"),
+        (("possible", "rejected"), "possible"),
+    ],
+)
+def test_of_copies_that_contradict_each_other_one_stands(
+    said: tuple[str, str], stands: str
+) -> None:
+    before = found((30, 50, 4))
+    copied = with_status(pd.concat([before, before], ignore_index=True), *said)
+    with pytest.warns(FormatWarning, match="contradict each other"):
+        table, _ = reconcile(copied, Written.of(before, np.zeros(1, bool)), GRID)
+    assert table[["obstacle_no", "status"]].to_numpy().tolist() == [[1, stands]]
+
+
+def test_the_next_number_is_behind_those_there_and_those_there_were() -> None:
+    two = found((30, 50, 4), (60, 50, 4))
+    records = None, Written(), Written(last_no=1), Written(last_no=7)
+    assert [free_number(None, one) for one in records] == [1, 1, 2, 8]
+    assert [free_number(two, one) for one in records] == [3, 3, 3, 8]

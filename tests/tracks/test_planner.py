@@ -836,6 +836,16 @@ def test_a_machine_wider_than_the_field_is_told_by_its_width() -> None:
         plan_tracks(box(0, 0, 100, 60), crs=CRS, spacing_m=4.0, width_m=500.0)
 
 
+def test_obstacles_without_a_number_have_the_next_ones() -> None:
+    obstacles = gpd.GeoDataFrame(
+        {"obstacle_no": [None, 7, None]},
+        geometry=[box(x, 9, x + 8, 17) for x in (30, 90, 150)],
+        crs=CRS,
+    )
+    planned = plan_tracks(box(0, 0, 200, 60), obstacles, crs=CRS, spacing_m=6, direction=90)
+    assert planned.gaps["obstacle_no"].tolist() == [8, 7, 9] * 2
+
+
 def test_an_obstacle_of_the_number_0_is_named_as_the_cause_of_its_gaps() -> None:
     trees = gpd.GeoDataFrame(
         {"obstacle_no": [0, 1]}, geometry=[box(50, 9, 58, 17), box(150, 9, 158, 17)], crs=CRS
