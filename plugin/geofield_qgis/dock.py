@@ -99,6 +99,11 @@ class ReviewDock(QDockWidget):
         """Whether an edit would reach the plan: while its file is written, no layer holds it."""
         return self.review is not None and self._released is None
 
+    @property
+    def _unsaved(self) -> bool:
+        """Whether edits that the tracks follow lie in no file yet."""
+        return any(each.isModified() for each in self._followed())
+
     def _is_ours(self, key: str) -> bool:
         """Whether a key is the panel's now; QGIS's own are those of an active layer in editing."""
         active = self.iface.activeLayer()
@@ -113,7 +118,7 @@ class ReviewDock(QDockWidget):
         self.buttons["open"].setEnabled(self._released is None)
         self.buttons["undo"].setEnabled(layer is not None and layer.undoStack().canUndo())
         self.buttons["redo"].setEnabled(layer is not None and layer.undoStack().canRedo())
-        unsaved = layer is not None and any(each.isModified() for each in self._followed())
+        unsaved = layer is not None and self._unsaved
         self.setWindowTitle(tr("Review of a field") + (" *" if unsaved else ""))
         self.labels.tell(
             None if self.review is None else self.review.layer, self.path, self.current
@@ -145,7 +150,7 @@ class ReviewDock(QDockWidget):
         self.current = None
         self._tell()
         self.step(1)
-        self.replan(preview=False)
+        self.replan(preview=self._unsaved)
         self._may_edit(of_one=False)
 
     def _followed(self) -> list[QgsVectorLayer]:

@@ -164,6 +164,20 @@ def farm(plan):
     return {"said": panel.window.said(), "count": dock.labels.count.text()}
 
 
+def taken_over(plan):
+    """Whether there is a sketch with an edit, when the plan is let go, and when it is had again."""
+    _, dock = opened(plan)
+    found = [dock.preview.is_shown]
+    dock.decide("rejected")
+    settled(dock)
+    found.append(dock.preview.is_shown)
+    dock.close_review()
+    found.append(dock.preview.is_shown)
+    dock.open(plan)
+    settled(dock)
+    return [*found, dock.preview.is_shown]
+
+
 def numbered_anew(plan):
     """Another program gives the row that is looked at to another obstacle; two keys then."""
     layers, dock = opened(plan)
@@ -203,7 +217,7 @@ def held(plan):
 
 _ALL = (
     outline, outline_cut, while_written, deleted_and_drawn, made_read_only, project_with_sketch,
-    farm, numbered_anew, held,
+    farm, numbered_anew, held, taken_over,
 )  # fmt: skip
 
 if __name__ == "__main__":

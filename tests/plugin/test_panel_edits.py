@@ -69,6 +69,10 @@ def test_a_key_means_the_obstacle_that_is_marked(panel, plan):
     assert seen["said"] == ["geofield: The plan was changed outside of this panel: look again."]
 
 
+def test_edits_that_the_panel_takes_over_are_sketched(panel, plan):
+    assert panel("taken_over", plan=plan) == [False, True, False, True]
+
+
 def test_a_key_that_is_held_decides_once(panel, plan):
     assert panel("held", plan=plan) == {"rejected": 1, "stepped": True}
 
