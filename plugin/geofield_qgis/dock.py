@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from html import escape
 from typing import Any
 
@@ -47,7 +48,7 @@ class ReviewDock(QDockWidget):
         self.live = Live(self)
         self.live.failed.connect(self._fail)
         self._released: plan_files.Released | None = None
-        self._connections: list[tuple[Any, Any]] = []
+        self._connections: list[tuple[str, Any, Any]] = []
         self._mark = Mark(self.canvas)
         self.preview = Preview(self.canvas)
         self._build()
@@ -144,9 +145,7 @@ class ReviewDock(QDockWidget):
         self.close_review()
         self.path, self.review = path, Review(layer)
         for each in self._followed():
-            self._connect(each.undoStack().indexChanged, self._edited)
-            self._connect(each.afterCommitChanges, self._saved)
-            self._connect(each.afterRollBack, self._edited)
+            self._connect(each)
         self.current = None
         self._tell()
         self.step(1)
@@ -158,18 +157,25 @@ class ReviewDock(QDockWidget):
         outline = plan_files.layers_of(self.path).get("field")
         return [self.review.layer, *([] if outline is None else [outline])]
 
-    def _connect(self, signal: Any, slot: Any) -> None:
-        signal.connect(slot)
-        self._connections.append((signal, slot))
+    def _connect(self, layer: QgsVectorLayer) -> None:
+        for signal, slot in (
+            (layer.undoStack().indexChanged, self._edited),
+            (layer.afterCommitChanges, self._saved),
+            (layer.afterRollBack, self._edited),
+        ):
+            signal.connect(slot)
+            self._connections.append((layer.id(), signal, slot))
+
+    def _disconnect(self, ids: Collection[str]) -> None:
+        """Hear no more of layers; while they are there: of one that is gone QGIS would end."""
+        for layer_id, signal, slot in self._connections:
+            if layer_id in ids:
+                signal.disconnect(slot)
+        self._connections = [each for each in self._connections if each[0] not in ids]
 
     def close_review(self) -> None:
         """Let the plan go; what is in the edit buffer stays there."""
-        for signal, slot in self._connections:
-            try:
-                signal.disconnect(slot)
-            except (TypeError, RuntimeError):
-                continue  # the layer is gone
-        self._connections = []
+        self._disconnect({layer_id for layer_id, *_ in self._connections})
         self.review, self.current = None, None
         self._timer.stop()
         self.preview.clear()
@@ -177,6 +183,7 @@ class ReviewDock(QDockWidget):
         self._tell()
 
     def _layers_go(self, ids: list[str]) -> None:
+        self._disconnect(ids)
         if self.review is not None and self.review.layer.id() in ids:
             self.close_review()
 

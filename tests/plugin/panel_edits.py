@@ -178,6 +178,20 @@ def taken_over(plan):
     return [*found, dock.preview.is_shown]
 
 
+def removed(plan):
+    """An obstacle decided after the outline's layer was removed; then the project is closed."""
+    layers, dock = opened(plan)
+    QgsProject.instance().removeMapLayer(layers.pop("field").id())
+    until(lambda: True)  # QGIS deletes it now
+    dock.decide("rejected")
+    settled(dock)
+    dock.save()
+    written(dock)
+    found = [dock.labels.count.text(), panel.window.said()]
+    QgsProject.instance().clear()
+    return [*found, dock.labels.title.text()]
+
+
 def numbered_anew(plan):
     """Another program gives the row that is looked at to another obstacle; two keys then."""
     layers, dock = opened(plan)
@@ -217,7 +231,7 @@ def held(plan):
 
 _ALL = (
     outline, outline_cut, while_written, deleted_and_drawn, made_read_only, project_with_sketch,
-    farm, numbered_anew, held, taken_over,
+    farm, numbered_anew, held, taken_over, removed,
 )  # fmt: skip
 
 if __name__ == "__main__":

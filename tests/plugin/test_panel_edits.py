@@ -73,6 +73,13 @@ def test_edits_that_the_panel_takes_over_are_sketched(panel, plan):
     assert panel("taken_over", plan=plan) == [False, True, False, True]
 
 
+def test_the_outline_may_be_removed_from_the_project(panel, plan):
+    count, said, title = panel("removed", plan=plan)
+    assert count == "20 left to look at, 1 rejected"
+    assert said == []
+    assert title == "Choose a layer of a plan, then press the button."
+
+
 def test_a_key_that_is_held_decides_once(panel, plan):
     assert panel("held", plan=plan) == {"rejected": 1, "stepped": True}
 
