@@ -484,6 +484,43 @@ def test_a_tool_that_was_taken_before_the_answer_is_kept(page: Page) -> None:
     assert page.state()["obstacles"][-1]["status"] == "added"
 
 
+@pytest.mark.parametrize("tool", ["select", "outline"])
+def test_an_answer_takes_nothing_out_of_the_hand(page: Page, tool: str) -> None:
+    """What was dragged once more jumped back, while the hand went on with it unseen."""
+    shown = (
+        "const [done] = arguments; import('/map.js').then(({sources}) => done(["
+        "sources.obstacles.getFeatureById(8), sources.outline.getFeatures()[0]]"
+        ".map(one => one.getGeometry().getExtent()[2])));"
+    )
+    which = ["select", "outline"].index(tool)
+
+    def right() -> float:
+        return float(page.driver.execute_async_script(shown)[which])
+
+    page.run("document.querySelector('#list [data-no=\"8\"]').click()")
+    page.driver.find_element(By.CSS_SELECTOR, f"[data-tool={tool}]").click()
+    state = page.state()
+    x, y = (page.obstacle(8)["centre"], max(state["field"]["rings"][0]))[which]
+    page.driver.execute_async_script(
+        "const [place, done] = arguments; import('/map.js').then(({view}) => {"
+        " view.setCenter(place); view.setResolution(0.2); setTimeout(done, 400); });",
+        [x, y],
+    )
+    before = right()
+    page.driver.execute_cdp_cmd("Network.enable", {})
+    slow = {"offline": False, "latency": 1000, "downloadThroughput": -1, "uploadThroughput": -1}
+    page.driver.execute_cdp_cmd("Network.emulateNetworkConditions", slow)
+    page.drag((x, y), (x + 8, y), steps=2)
+    half_drag(page, page.pixel(x + 8, y))
+    page.wait(lambda: not page.driver.find_element(By.ID, "undo").get_property("disabled"))
+    assert right() - before == pytest.approx(14, abs=0.5)
+    page.driver.execute_cdp_cmd("Network.emulateNetworkConditions", {**slow, "latency": 0})
+    ActionChains(page.driver).release().perform()
+    page.wait(lambda: int(page.state()["stamp"].split(".")[1]) == 2)
+    time.sleep(0.3)
+    assert right() - before == pytest.approx(14, abs=0.5)
+
+
 def test_a_size_that_was_dragged_is_kept_by_the_next_drag(page: Page) -> None:
     """The second one begins where the first one ended, and not where the last answer was."""
     page.run("document.querySelector('#list [data-no=\"8\"]').click()")

@@ -90,8 +90,12 @@ export function showTracks(answer, moving = false) {
 const together = (lines, values = {}) =>
   lines.length ? [new ol.Feature({geometry: new ol.geom.MultiLineString(lines), ...values})] : [];
 
+// What a hand holds, an obstacle's number or the outline, stays as the hand has it, whatever answer comes meanwhile.
+let inHand = null;
+export const hold = what => { inHand = what; };
+
 export function showOutline(field) {
-  fill("outline", [new ol.Feature({geometry: symbols.closed(field.rings), color: symbols.outlineColor(field)})]);
+  if (inHand !== "outline") fill("outline", [new ol.Feature({geometry: symbols.closed(field.rings), color: symbols.outlineColor(field)})]);
   fill("frame", field.frame.map(xy => symbols.line(xy)));
 }
 
@@ -108,6 +112,7 @@ export function showObstacles(rows) {
   const old = sources.obstacles, left = new Set(rows.map(row => row.no));
   for (const feature of old.getFeatures()) if (!left.has(feature.getId())) old.removeFeature(feature);
   for (const row of rows) {
+    if (row.no === inHand) continue;
     const text = JSON.stringify(row), before = old.getFeatureById(row.no);
     if (before?.get("text") === text && before.get("shape") === shapeOf(before)) continue;
     if (before) old.removeFeature(before);
@@ -118,6 +123,7 @@ export function showObstacles(rows) {
 }
 
 export function showHandle(row) {
+  if (inHand !== null) return;
   sources.handle.clear(true);
   if (!row || row.radius_m === null) return;
   const [x, y] = row.centre, reach = row.radius_m + row.buffer_m;

@@ -59,6 +59,7 @@ export function use(name) {
   for (const one of held) maps.map.removeInteraction(one);
   maps.sources.sketch.clear(true);
   // What a hand still held goes back to where it was.
+  maps.hold(null);
   endPreview();
   desk.again();
   desk.measured("");
@@ -105,10 +106,12 @@ const MAKERS = {
     const command = ({features}) => ({do: "outline", rings: ringsOf(features.item(0))});
     let listening = null;
     modify.on("modifystart", event => {
+      maps.hold("outline");
       listening = event.features.item(0).getGeometry().on("change", () => live(command(event)));
     });
     modify.on("modifyend", event => {
       ol.Observable.unByKey(listening);
+      maps.hold(null);
       commit(command(event));
     });
     return [modify];
@@ -159,6 +162,13 @@ function shape(type, command, back = false) {
   return draw;
 }
 
+// A press that was no drag changes nothing.
+function letGo(command) {
+  maps.hold(null);
+  if (command) commit(command);
+  else desk.again();
+}
+
 // The chosen obstacle follows the pointer; others must be chosen first, so that none is moved by mistake.
 function mover() {
   const translate = new ol.interaction.Translate({
@@ -174,12 +184,13 @@ function mover() {
     no = desk.chosen();
     dragged = false;
     maps.sources.handle.clear();
+    maps.hold(no);
   });
   translate.on("translating", event => {
     dragged = true;
     live(command(event));
   });
-  translate.on("translateend", event => dragged ? commit(command(event)) : desk.again());
+  translate.on("translateend", event => letGo(dragged && command(event)));
   return translate;
 }
 
@@ -197,6 +208,7 @@ function resizer() {
     grip = away(coordinate);
     before_m = away(features.item(0).getGeometry().getCoordinates()) - row.buffer_m;
     dragged = false;
+    maps.hold(row.no);
   });
   translate.on("translating", event => {
     dragged = true;
@@ -205,6 +217,6 @@ function resizer() {
       ol.geom.Polygon.fromCircle(new ol.geom.Circle(row.centre, wanted.radius_m + row.buffer_m), 64));
     live(wanted);
   });
-  translate.on("translateend", event => dragged ? commit(command(event)) : desk.again());
+  translate.on("translateend", event => letGo(dragged && command(event)));
   return translate;
 }
