@@ -281,12 +281,23 @@ def _shapes(shapes: ObstacleShapes | None) -> Any:
 
 
 def _cut(line: Any, free: Any) -> list[Any]:
-    """The pieces of a line in the free area, along it."""
+    """The pieces of a line in the free area, along it, wherever it crosses or follows itself."""
     if free is None or free.covers(line):
         return [line]
-    pieces = [each for each in shapely.get_parts(line.intersection(free)) if each.length > 0.0]
-    joined = shapely.get_parts(shapely.line_merge(shapely.MultiLineString(pieces), directed=True))
-    return sorted(joined, key=lambda each: line.project(shapely.Point(each.coords[0])))
+    corners = shapely.get_coordinates(line)
+    legs = np.asarray(shapely.linestrings(np.stack((corners[:-1], corners[1:]), axis=1)))
+    cut = ~shapely.covers(free, legs)
+    legs[cut] = shapely.intersection(legs[cut], free)
+    parts, leg = shapely.get_parts(legs, return_index=True)
+    long = shapely.length(parts) > 0.0
+    parts, leg = parts[long], leg[long]
+    ends = np.stack([shapely.get_coordinates(shapely.get_point(parts, at)) for at in (0, -1)], 1)
+    along = np.einsum("pei,pi->pe", ends, np.diff(corners, axis=0)[leg])
+    ends = np.where((along[:, 0] > along[:, 1])[:, None, None], ends[:, ::-1], ends)
+    ends = ends[np.lexsort((along.min(axis=1), leg))]
+    breaks = np.flatnonzero((ends[1:, 0] != ends[:-1, 1]).any(axis=1)) + 1
+    runs = np.split(ends, breaks) if len(ends) else []
+    return [shapely.LineString([run[0, 0], *run[:, 1]]) for run in runs]
 
 
 def _joined(tracks: Tracks, rows: Sequence[Any], gaps: Sequence[Any]) -> Tracks:

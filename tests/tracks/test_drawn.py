@@ -1,0 +1,62 @@
+"""Tracks that a person drew: cut by what stands in them, and by nothing else."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+
+from geofield.model.track_edits import TrackEdit, TrackEdits
+from geofield.model.tracks import Tracks
+from geofield.tracks import plan_tracks
+
+CORNER = np.array([500_000.0, 5_600_000.0])
+RADIUS = 3.0
+
+
+def tracks_with(drawn: list[Any], circles: list[tuple[float, float]]) -> Tracks:
+    """Tracks of a hectare with lines drawn, and circles in it."""
+    edits = tuple(
+        TrackEdit(7, drawn=shapely.MultiLineString([CORNER + line]).wkt) for line in drawn
+    )
+    return plan_tracks(
+        shapely.box(*CORNER, *(CORNER + 100.0)),
+        [shapely.Point(CORNER + one).buffer(RADIUS, quad_segs=64) for one in circles],
+        crs="+proj=tmerc +lon_0=15 +k=1 +x_0=500000 +datum=WGS84 +units=m",
+        spacing_m=10.0,
+        direction=90,
+        edits=TrackEdits(edits),
+    )
+
+
+@pytest.mark.parametrize(
+    ("line", "circle", "expected_m"),
+    [
+        ([(10, 20), (60, 20), (60, 60), (40, 60), (40, 10), (90, 10)], (80, 10), [197, 7]),
+        ([(10, 20), (60, 20), (20, 20), (20, 80)], (20, 60), [127, 17]),
+        ([(10, 10), (60, 10), (60, 60), (10, 60), (10, 10)], (60, 40), [77, 117]),
+        ([(10, 20), (30, 20), (30, 20), (30, 90), (30, 10)], (30, 60), [57, 54, 47]),
+        ([(10, 20), (50, 20), (90, 20)], (50, 20), [37, 37]),
+        ([(-30, 20), (90, 20)], (50, 20), [47, 37]),
+    ],
+    ids=["crossing itself", "there and back", "a ring", "back through it", "a corner", "border"],
+)
+def test_a_drawn_track_is_driven_along_it_up_to_what_stands_there(
+    line: Any, circle: tuple[float, float], expected_m: list[float]
+) -> None:
+    tracks = tracks_with([line], [circle])
+    mine = tracks.segments[tracks.segments["track_no"] == 11]
+    assert mine["length_m"].tolist() == pytest.approx(expected_m, abs=0.01)
+    begin = shapely.get_coordinates(mine.geometry.to_numpy()[0])[0] - CORNER
+    assert begin == pytest.approx(np.clip(line[0], 0, 100), abs=1e-6)
+    whole = shapely.LineString(CORNER + line)
+    assert all(whole.buffer(1e-6).covers(each) for each in mine.geometry)
+    gaps = tracks.gaps[tracks.gaps["track_no"] == 11]
+    assert gaps["cause"].tolist() == ["obstacle 1"] * (len(expected_m) - 1)
+
+
+def test_added_tracks_are_numbered_on_without_a_gap() -> None:
+    tracks = tracks_with([[(10, 12), (90, 12)], [(10, 14), (90, 14)], [(10, 16), (90, 16)]], [])
+    assert tracks.lines["track_no"].tolist() == list(range(1, 14))
