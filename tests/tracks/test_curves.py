@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -33,6 +35,46 @@ def test_reeds_shepp_is_the_same_both_ways(pairs: tuple[np.ndarray, np.ndarray])
     there = reeds_shepp_words(*pairs, 5.0).total.min(axis=1)
     back = reeds_shepp_words(*pairs[::-1], 5.0).total.min(axis=1)
     assert np.abs(there - back).max() < 1e-9
+
+
+#: Steer and sign of each piece of the drives of Reeds and Shepp's nine families, those that are
+#: driven from the other end left out, and of Dubins' three: `q` is a quarter circle, `u` are arcs
+#: as long as each other, `w` is more than half a circle.
+DRIVES = (
+    "L+ S+ L+", "L+ S+ R+", "L+ R- L+", "L+ R+ L-", "L+ Ru+ Lu- R-", "L+ Ru- Lu- R+",
+    "L+ Rq- S- L-", "L+ Rq- S- R-", "L+ Rq- S- Lq- R+",
+)  # fmt: skip
+FORWARDS = ("L+ S+ L+", "L+ S+ R+", "L+ Rw+ L+")
+
+
+@pytest.mark.parametrize(
+    ("words", "drive"),
+    [*((reeds_shepp_words, one) for one in DRIVES), *((dubins_words, one) for one in FORWARDS)],
+)
+def test_no_drive_is_shorter_than_the_one_that_is_found(words: Any, drive: str) -> None:
+    rng = np.random.default_rng(3)
+    count = 400
+    arcs = {"u": rng.uniform(0.0, np.pi / 3.0, count), "q": np.full(count, np.pi / 2.0)}
+    arcs["w"] = rng.uniform(np.pi, 1.5 * np.pi, count)
+    place, angle, total = np.zeros(count, complex), np.zeros(count), np.zeros(count)
+    mirrored, reverse = rng.choice([-1.0, 1.0], (2, count))
+    for piece in drive.split():
+        # An outer arc is no longer than those that are as long as each other.
+        longest = 4.0 if piece[0] == "S" else arcs["u"] if "u" in drive else np.pi / 2.0
+        far = arcs.get(piece[1], rng.uniform(0.0, longest, count))
+        signed = far * (1.0 if piece[-1] == "+" else -1.0)
+        signed *= reverse if words is reeds_shepp_words else 1.0
+        turned = signed * mirrored * {"L": 1.0, "S": 0.0, "R": -1.0}[piece[0]]
+        # The chord of an arc of radius 1 points half its turn aside.
+        place += signed * np.sinc(turned / (2.0 * np.pi)) * np.exp(1j * (angle + turned / 2.0))
+        angle, total = angle + turned, total + far
+    goal = np.column_stack((place.real, place.imag, angle))
+    # From the other end with the directions turned about, forwards stay forwards.
+    about = np.array([0.0, 0.0, np.pi])
+    for start, end in ((np.zeros_like(goal), goal), (goal + about, np.zeros_like(goal) + about)):
+        found = words(start, end, 1.0).total.min(axis=1)
+        assert (found < total + 1e-9).all()
+        assert (found > total - 1e-9).mean() > 0.05
 
 
 def test_known_lengths() -> None:

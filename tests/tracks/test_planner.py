@@ -90,6 +90,26 @@ def test_circles_are_cut_as_circles_and_named() -> None:
     assert loss.length_m == pytest.approx(gaps["length_m"].sum())
 
 
+@pytest.mark.parametrize("inside_m", [1e-2, 1e-4, 1e-6])
+def test_a_circle_that_hardly_reaches_a_track_takes_a_chord_of_it(inside_m: float) -> None:
+    tree = circles((50, 20, 5 + inside_m))
+    tracks = plan_tracks(box(0, 0, 100, 40), tree, crs=CRS, spacing_m=10.0)
+    # Of a circle of 5 + d, 5 beside its middle: 2 sqrt(d (10 + d)).
+    chord_m = 2.0 * np.sqrt(inside_m * (10.0 + inside_m))
+    assert tracks.gaps["length_m"].tolist() == pytest.approx([chord_m, chord_m], rel=0.01)
+
+
+def test_more_tracks_than_a_short_number_counts_keep_their_order() -> None:
+    tracks = plan_tracks(
+        box(0, 0, 30, 330), circles((15, 165, 5)), crs=CRS, spacing_m=0.01, direction=90, step_m=50
+    )
+    assert tracks.lines["track_no"].tolist() == list(range(1, 33_001))
+    assert len(tracks.gaps) == 1000
+    assert tracks.segments["length_m"].sum() == pytest.approx(
+        (30 * 330 - np.pi * 25) / 0.01, rel=1e-6
+    )
+
+
 @pytest.mark.parametrize("edit", ["moved", "reshaped", "dented"])
 def test_a_persons_drawing_is_the_truth(edit: str) -> None:
     table = circles((50, 22, 7))

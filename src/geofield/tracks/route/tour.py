@@ -87,8 +87,9 @@ class _Search:
         """Cost of driving between two ends of different segments."""
         if a >= self.ends or b >= self.ends:
             # The drive starts at what the exit of the extra segment leads to; it ends anywhere.
-            known = self.begin is not None and max(a, b) == self.ends + 1
-            return self.begin[min(a, b)] if known and self.begin is not None else 0.0
+            if self.begin is None or max(a, b) != self.ends + 1:
+                return 0.0
+            return self.begin[min(a, b)]
         found = self.cost.get(a * self.ends + b)
         if found is not None:
             return found
