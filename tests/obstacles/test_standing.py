@@ -1,0 +1,23 @@
+"""What stands in a field and is no tree: how far it reaches in the cells of the network's answer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from geofield.model.circles import Circles
+from geofield.obstacles.crowns import CELL_PX
+from geofield.obstacles.standing import StandingMap
+
+
+def test_a_thing_reaches_as_far_as_half_its_clearest_answer() -> None:
+    cells = np.zeros((100, 100), np.uint8)
+    cells[40:60, 40:60] = 60
+    cells[45:55, 45:55] = 240
+    standing = StandingMap(cells, np.zeros_like(cells), 10, 20)
+    field = shapely.box(*(CELL_PX * np.array([10, 20, 110, 120])))
+    (thing,), (probability,) = standing.things(field, Circles(), least=0.4)
+    assert probability == pytest.approx(240 / 255)
+    core = shapely.box(*(CELL_PX * np.array([55, 65, 65, 75])))
+    assert thing.symmetric_difference(core).area < 0.05 * core.area
