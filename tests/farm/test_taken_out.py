@@ -22,6 +22,7 @@ from geofield.pipeline import run_tracks
 from geofield.plan_files import save_plan
 from geofield.settings import Settings
 from geofield.staging.generations import undo
+from geofield_command import run_geofield
 
 UTM = CRS(32633)
 
@@ -88,3 +89,14 @@ def test_a_plan_of_other_ground_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="'b' is of a field elsewhere"):
         put_back(tmp_path / "b.gpkg", farm)
     assert gf.read_farm(farm)["a"] == before
+
+
+def test_a_file_in_place_of_the_farm_is_no_farm(tmp_path: Path) -> None:
+    # Errors of the system told of a file of the farm's inside that file.
+    plan = _get(_farm(tmp_path / "farm"), tmp_path / "one.gpkg")
+    done = run_geofield("farm", "get", "farm/farm.gpkg", "a", "-o", "two.gpkg", folder=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.startswith("Error: farm/farm.gpkg is no farm of geofield"), done.stderr
+    done = run_geofield("farm", "put", plan.name, "farm/farm.gpkg", folder=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.startswith("Error: farm/farm.gpkg is no farm of geofield"), done.stderr

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import pickle
 import re
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -527,6 +528,11 @@ def test_unreadable_truncated_empty(tmp_path: Path, rgb: str) -> None:
     (tmp_path / "text.tif").write_text("not a picture")
     with pytest.raises(ImageryError, match="cannot be opened"):
         read_scene(tmp_path / "text.tif")
+    with zipfile.ZipFile(tmp_path / "packed.zip", "w") as archive:
+        archive.write(rgb, "ortho.tif")
+    with pytest.raises(ImageryError, match="cannot be opened") as refused:
+        read_scene(tmp_path / "packed.zip")
+    assert "unpacked from its archive" in str(refused.value.hint)
     (tmp_path / "zero.tif").touch()
     with pytest.raises(ImageryError, match="0 bytes"):
         read_scene(tmp_path / "zero.tif")

@@ -112,7 +112,7 @@ class Store:
             with system.open_input_file(f"{prefix}/{name}") as stream:
                 data: bytes = stream.read()
                 return data
-        except FileNotFoundError:
+        except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
             raise FormatError(f"{self.shown}/{name} cannot be read: {_short(error)}") from None

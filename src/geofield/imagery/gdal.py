@@ -132,8 +132,8 @@ def open_picture(path: str, reach: Reach = OWN_FOLDER, *, placed: bool = False) 
             hint=(
                 "Check the address and the network."
                 if is_remote(path)
-                else "It must be a raster file that GDAL reads (GeoTIFF, COG, VRT, JPEG 2000 ...); "
-                "`gdalinfo` tells more."
+                else "It must be a raster file that GDAL reads (GeoTIFF, COG, VRT, JPEG 2000 ...), "
+                "unpacked from its archive; `gdalinfo` tells more."
             ),
         ) from None
 
