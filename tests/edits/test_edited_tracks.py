@@ -21,7 +21,9 @@ from pyproj import CRS
 from shapely import LineString, MultiLineString
 from shapely.affinity import translate
 
+from geofield import schema
 from geofield.formats import validate_file
+from geofield.model.lost_numbers import known_by_shape
 from geofield.model.segment_values import SegmentValues, values_in, with_values
 from geofield.model.track_edits import TrackEdit, TrackEdits
 from geofield.model.tracks import Tracks
@@ -786,3 +788,15 @@ def test_a_copy_without_settings_tells_which_spacing_it_gets(folder: Path) -> No
     assert "settings are lost" not in geofield(
         "tracks", file, "--spacing", 6, "-o", copy, "--overwrite"
     )
+
+
+def test_a_track_that_was_shortened_before_a_dissolve_stays_so() -> None:
+    """It is cut where a line that was drawn crosses it, and whole again as far as it was left."""
+    lines = [LineString([(0, y), (100, y)]) for y in (0, 6, 12)]
+    left = [lines[0], LineString([(0, 6), (60, 6)]), lines[2]]
+    dissolved = shapely.union_all([*left, LineString([(20, -3), (40, 34)])])
+    layer = schema.table(schema.SEGMENTS, {}, [dissolved], CRS(32633))
+    written = TracksWritten.of([1, 2, 3], lines, heading_deg=90.0, spacing_m=6.0, middle=(0.0, 0.0))
+    found = known_by_shape(schema.SEGMENTS, layer, written)
+    of_two = found[found["track_no"] == 2].length
+    assert of_two.tolist() == pytest.approx([60.0])
