@@ -1,4 +1,4 @@
-"""What stands in a field and is no tree: how far it reaches in the cells of the network's answer."""
+"""What stands in a field and is no tree: how far it reaches in the cells of the answer."""
 
 from __future__ import annotations
 
