@@ -20,6 +20,7 @@ import shapely.affinity
 import geofield as gf
 from geofield.errors import CRSError, FormatError
 from geofield.farm import read_places
+from geofield_command import run_geofield
 
 POINTS = pd.DataFrame(
     {
@@ -376,6 +377,19 @@ def test_text_shapes_are_in_the_crs_that_is_named(tmp_path: Path) -> None:
     assert places.lat[0] == pytest.approx(47.8538, abs=1e-3)
     with pytest.raises(FormatError, match="no position on earth"):
         read_places(tmp_path / "utm.csv")
+
+
+def test_one_row_that_is_wrong_does_not_blame_the_columns(tmp_path: Path) -> None:
+    # "Exchange the columns' names" would have moved the rows that are right to another country.
+    (tmp_path / "some.csv").write_text("id,lat,lon\na,35.1,33.5\nb,91,33.5\nc,,\n")
+    done = run_geofield("batch", "some.csv", "--out", "farm", folder=tmp_path)
+    assert done.returncode == 1
+    assert "no position on earth in row 2 (lat 91, lon 33.5)" in done.stderr
+    assert "Correct it there: latitude and longitude may be exchanged." in done.stderr
+    (tmp_path / "all.csv").write_text("id,lat,lon\na,-117.3,34.0\nb,-117.4,34.1\nc,,\n")
+    done = run_geofield("batch", "all.csv", "--out", "farm", folder=tmp_path)
+    assert done.returncode == 1
+    assert "look swapped: exchange the columns' names" in done.stderr
 
 
 def test_layers_and_rows_that_are_none(tmp_path: Path) -> None:

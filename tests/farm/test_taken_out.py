@@ -100,3 +100,15 @@ def test_a_file_in_place_of_the_farm_is_no_farm(tmp_path: Path) -> None:
     done = run_geofield("farm", "put", plan.name, "farm/farm.gpkg", folder=tmp_path)
     assert done.returncode == 1
     assert done.stderr.startswith("Error: farm/farm.gpkg is no farm of geofield"), done.stderr
+
+
+def test_reasons_are_looked_for_only_where_they_lie(tmp_path: Path) -> None:
+    # The next step named a failed.csv that a farm without failed places has not.
+    farm = _farm(tmp_path / "farm")
+    for there in (False, True):
+        if there:
+            (farm / "failed.csv").write_text("id,reason\nc,no field there\n", "utf-8")
+        done = run_geofield("farm", "get", "farm", "c", "-o", "c.gpkg", folder=tmp_path)
+        assert done.returncode == 1
+        assert "It has plans of a, b" in done.stderr
+        assert ("failed.csv" in done.stderr) == there, done.stderr

@@ -38,16 +38,21 @@ Example:
 def get(folder: str, field_id: str, output: Path, overwrite: bool) -> None:
     """Write the plan of field ID of FARM as a GeoPackage, for QGIS and `geofield review`."""
     from geofield.farm import read_farm
+    from geofield.farm.failed import FAILED
+    from geofield.farm.store import Store
     from geofield.farm.taken_out import taken_out
     from geofield.plan_files import save_plan
 
     say_waiting(folder)
     whole = read_farm(folder)
     if field_id not in whole:
+        reasons = (
+            f"; its {FAILED} tells why others have none" if Store.of(folder).get(FAILED) else ""
+        )
         some = ", ".join(whole.ids[:10]) + ", ..." * (len(whole) > 10)
         raise FormatError(
             f"{folder} has no plan of a field {field_id!r}." + nearest(field_id, whole.ids),
-            hint=f"It has plans of {some}; its failed.csv tells why others have none.",
+            hint=f"It has plans of {some}{reasons}.",
         )
     save_plan(taken_out(whole[field_id]), output, overwrite=overwrite)
     say(f"Plan       {output}")

@@ -139,7 +139,9 @@ def check_positions(raw: RawTable, lat: Any, lon: Any, row: Any, source: CRS) ->
     refuse_outside(source, lat[wrong], lon[wrong], what=f"{raw.name}: coordinates in row {shown}")
     first = f"lat {lat[wrong[0]]:g}, lon {lon[wrong[0]]:g}"
     swapped = (np.abs(lat[wrong]) <= 180) & (np.abs(lon[wrong]) <= 90)
-    if swapped.all():
+    if swapped.all() and len(wrong) < np.isfinite(lat + lon).sum():
+        hint = "Correct it there: latitude and longitude may be exchanged."
+    elif swapped.all():
         what = (
             "the columns' names" if raw.geometry is None else "them in the file (`ogr2ogr -swapXY`)"
         )
