@@ -94,12 +94,12 @@ def test_a_plan_of_other_ground_is_refused(tmp_path: Path) -> None:
 def test_a_file_in_place_of_the_farm_is_no_farm(tmp_path: Path) -> None:
     # Errors of the system told of a file of the farm's inside that file.
     plan = _get(_farm(tmp_path / "farm"), tmp_path / "one.gpkg")
-    done = run_geofield("farm", "get", "farm/farm.gpkg", "a", "-o", "two.gpkg", folder=tmp_path)
+    done = run_geofield("farm", "get", "one.gpkg", "a", "-o", "two.gpkg", folder=tmp_path)
     assert done.returncode == 1
-    assert done.stderr.startswith("Error: farm/farm.gpkg is no farm of geofield"), done.stderr
-    done = run_geofield("farm", "put", plan.name, "farm/farm.gpkg", folder=tmp_path)
+    assert done.stderr.startswith("Error: one.gpkg is no farm of geofield"), done.stderr
+    done = run_geofield("farm", "put", plan.name, "one.gpkg", folder=tmp_path)
     assert done.returncode == 1
-    assert done.stderr.startswith("Error: farm/farm.gpkg is no farm of geofield"), done.stderr
+    assert done.stderr.startswith("Error: one.gpkg is no farm of geofield"), done.stderr
 
 
 def test_reasons_are_looked_for_only_where_they_lie(tmp_path: Path) -> None:
