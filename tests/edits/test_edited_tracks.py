@@ -790,13 +790,17 @@ def test_a_copy_without_settings_tells_which_spacing_it_gets(folder: Path) -> No
     )
 
 
-def test_a_track_that_was_shortened_before_a_dissolve_stays_so() -> None:
+@pytest.mark.parametrize("merged", ["dissolved", "collected"])
+def test_a_track_that_was_shortened_before_its_layer_was_merged_stays_so(merged: str) -> None:
     """It is cut where a line that was drawn crosses it, and whole again as far as it was left."""
     lines = [LineString([(0, y), (100, y)]) for y in (0, 6, 12)]
-    left = [lines[0], LineString([(0, 6), (60, 6)]), lines[2]]
-    dissolved = shapely.union_all([*left, LineString([(20, -3), (40, 34)])])
-    layer = schema.table(schema.SEGMENTS, {}, [dissolved], CRS(32633))
+    # The middle of what was drawn lies on the track that is known by nothing but its place.
+    drawn = LineString([(20, -4), (40, 16)])
+    left = [drawn, lines[0], LineString([(0, 6), (60, 6)]), lines[2]]
+    shape = shapely.union_all(left) if merged == "dissolved" else shapely.multilinestrings(left)
+    layer = schema.table(schema.SEGMENTS, {}, [shape], CRS(32633))
     written = TracksWritten.of([1, 2, 3], lines, heading_deg=90.0, spacing_m=6.0, middle=(0.0, 0.0))
     found = known_by_shape(schema.SEGMENTS, layer, written)
     of_two = found[found["track_no"] == 2].length
     assert of_two.tolist() == pytest.approx([60.0])
+    assert found[found["track_no"].isna()].length.tolist() == pytest.approx([drawn.length])

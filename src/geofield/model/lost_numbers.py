@@ -12,7 +12,7 @@ from pyproj import CRS
 from geofield import schema
 from geofield.crs import ground_lengths_m
 from geofield.errors import FormatWarning
-from geofield.model.tracks_written import TracksWritten, track_numbers
+from geofield.model.tracks_written import TracksWritten, run_alike, track_numbers
 from geofield.model.written import SAME_M
 from geofield.notes import warn
 from geofield.wording import counted
@@ -164,6 +164,8 @@ def _numbered(
     same |= shapely.equals_exact(shapely.reverse(lines[line]), before[other], SAME_M)
     middle = shapely.line_interpolate_point(lines[line], 0.5, normalized=True)
     away = np.where(same, -1.0, shapely.distance(middle, before[other]))
+    # One that was drawn across lies nowhere nearer to a track than where it meets it.
+    away[~same & ~run_alike(lines[line], before[other])] = np.inf
     found: set[int] = set()
     taken: set[int] = set()
     # What is as it was written comes first: a line beside it was drawn.

@@ -16,15 +16,15 @@ from numpy.typing import NDArray
 
 from geofield import schema
 from geofield.model.own_values import own_values, with_own_values
-from geofield.model.tracks_written import DECIMALS
+from geofield.model.tracks_written import DECIMALS, run_alike
 from geofield.model.written import SAME_M
 
 if TYPE_CHECKING:
     import geopandas as gpd
 
-#: How far beside its piece a segment may run, of the spacing, which share of it lies there at
-#: least, and how far it may turn away, degrees.
-_NEAR, _SHARE, _TURNED_DEG = 0.25, 0.5, 20.0
+#: How far beside its piece a segment may run, of the spacing, and which share of it lies there at
+#: least.
+_NEAR, _SHARE = 0.25, 0.5
 
 
 class SegmentValues(NamedTuple):
@@ -86,18 +86,7 @@ def _piece_of_each(
     length = shapely.length(lines[row])
     inside = shapely.length(shapely.intersection(lines[row], around[piece]))
     share = np.divide(inside, length, out=np.zeros_like(inside), where=length > 0)
-    turned = np.abs((_heading_deg(lines[row]) - _heading_deg(pieces[piece]) + 90) % 180 - 90)
-    fits = (share >= _SHARE) & (turned <= _TURNED_DEG)
+    fits = (share >= _SHARE) & run_alike(lines[row], pieces[piece])
     order = np.argsort(share[fits], kind="stable")
     best[row[fits][order]] = piece[fits][order]
     return best
-
-
-def _heading_deg(lines: NDArray[np.object_]) -> NDArray[np.float64]:
-    """From the begin of lines to their ends."""
-    # An editor may have made a line of several parts of one.
-    first, last = shapely.get_geometry(lines, 0), shapely.get_geometry(lines, -1)
-    begin = shapely.get_coordinates(shapely.get_point(first, 0))
-    end = shapely.get_coordinates(shapely.get_point(last, -1))
-    x, y = (end - begin).T
-    return np.asarray(np.degrees(np.arctan2(y, x)), np.float64)

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 #: Places are told to the millimetre.
 DECIMALS = 3
+#: How far a line may turn away from a track that it is of, degrees.
+_TURNED_DEG = 20.0
 
 #: The vertices of a line, (n, 2), metric CRS.
 Vertices = NDArray[np.float64]
@@ -151,3 +153,18 @@ def among(one: Vertices, others: Sequence[Vertices]) -> bool:
 def as_text(lines: Any) -> str:
     """Lines as WKT, to the millimetre."""
     return str(shapely.to_wkt(lines, rounding_precision=DECIMALS))
+
+
+def run_alike(lines: NDArray[np.object_], others: NDArray[np.object_]) -> NDArray[np.bool_]:
+    """Whether lines run, one way or back, as others do, from their begin to their end."""
+    turned = np.abs((_heading_deg(lines) - _heading_deg(others) + 90) % 180 - 90)
+    return np.asarray(turned <= _TURNED_DEG)
+
+
+def _heading_deg(lines: NDArray[np.object_]) -> NDArray[np.float64]:
+    # An editor may have made a line of several parts of one.
+    first, last = shapely.get_geometry(lines, 0), shapely.get_geometry(lines, -1)
+    begin = shapely.get_coordinates(shapely.get_point(first, 0))
+    end = shapely.get_coordinates(shapely.get_point(last, -1))
+    x, y = (end - begin).T
+    return np.asarray(np.degrees(np.arctan2(y, x)), np.float64)
