@@ -104,7 +104,7 @@ def first_file(name):
 
 rows = []
 for name, kind in FORMATS.items():
-    if kind.reader is None:
+    if kind.reader is None or "field" not in kind.layers:
         continue
     back = read_dataset(first_file(name))
     outline = back.table("field").to_crs(plan.field.crs).geometry.iloc[0]
