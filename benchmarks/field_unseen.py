@@ -15,7 +15,7 @@ import sys
 import time
 import warnings
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import Pool
@@ -196,18 +196,26 @@ def among(case: Case, number: int) -> Case:
 
 def clicked(case: Case, way: str, most: int = MOST_CLICKS) -> list[float]:
     """Overlaps after the first point, the second, ... until the aim is reached."""
+    overlaps: list[float] = []
+    for outline in corrected(case, way, most):
+        overlaps.append(overlap(outline, case.truth) if outline.area else 0.0)
+        if overlaps[-1] >= AIM and len(overlaps) > 2:
+            break
+    return overlaps
+
+
+def corrected(case: Case, way: str, most: int = MOST_CLICKS) -> Iterator[shapely.Polygon]:
+    """The outlines after the first point, the second, ...: each where most is wrong."""
     include: list[Point] = [(case.x_px, case.y_px)]
     exclude: list[Point] = []
     run = WAYS[way](case)
-    overlaps: list[float] = []
     for _ in range(most):
         outline = run(include, exclude)
-        overlaps.append(overlap(outline, case.truth) if outline.area else 0.0)
+        yield outline
         wrong = middle_of_error(outline, case.truth, case.scene.grid.shape)
-        if wrong is None or (overlaps[-1] >= AIM and len(overlaps) > 2):
-            break
+        if wrong is None:
+            return
         (include if wrong[0] else exclude).append(wrong[1])
-    return overlaps
 
 
 def ours(case: Case) -> Callable[[list[Point], list[Point]], shapely.Polygon]:

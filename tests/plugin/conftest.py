@@ -41,6 +41,14 @@ def qgis(qgis_environment):
         yield ask
 
 
+@pytest.fixture(scope="module")
+def panel(request, qgis_environment):
+    """Ask QGIS something of its review panel; the file beside the test says what."""
+    file = request.path.with_name(request.path.name.removeprefix("test_"))
+    with asking(file, qgis_environment) as ask:
+        yield ask
+
+
 @pytest.fixture(scope="session")
 def geofield():
     """Run the command itself, to compare with."""

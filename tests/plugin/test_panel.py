@@ -5,17 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from plugin_place import CLIENT, SAMPLE
+from plugin_place import SAMPLE
 
 from geofield.formats import read_dataset
 from geofield.plan import read_plan
-from real_qgis import asking
-
-
-@pytest.fixture(scope="module")
-def panel(qgis_environment):
-    with asking(CLIENT.with_name("panel.py"), qgis_environment) as ask:
-        yield ask
 
 
 def test_saving_takes_no_edits_of_another_layer(panel, plan):

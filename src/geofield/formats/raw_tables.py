@@ -23,7 +23,7 @@ from geofield.strangers import check_vector, unreadable
 from geofield.wording import nearest
 
 CSV = (".csv", ".tsv", ".txt")
-_ROWS = "Give one row per field."
+_ROWS = "Give a row of names, and one per field or obstacle."
 _UTF_8 = "Save it as UTF-8 (Excel: CSV UTF-8)."
 #: Kinds of shapes that may have arcs: circular strings to multi-surfaces.
 _CURVED = range(8, 13)
@@ -32,7 +32,7 @@ _GEOMETRY = ("geometry", "geom", "wkt", "the_geom")
 
 @dataclass(frozen=True, slots=True)
 class RawTable:
-    """A file of places as it is."""
+    """A file of rows as it is."""
 
     #: For people.
     name: str
@@ -48,7 +48,7 @@ class RawTable:
 
 
 def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> RawTable:
-    """A file of places; `layer` is needed where it has several.
+    """A file of rows; `layer` is needed where it has several.
 
     `texts` are columns that are text whatever they look like: 007 is no 7.
 
@@ -59,7 +59,7 @@ def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> R
     """
     if not path.exists():
         raise FormatError(
-            f"There is no file {path}.", hint="PLACES is a file with a row per field."
+            f"There is no file {path}.", hint="It is a file with a row per field or obstacle."
         )
     if path.suffix.lower() in (*CSV, *PARQUET):
         refuse_layer(path, layer)
@@ -103,7 +103,7 @@ def _csv(path: Path, texts: set[str]) -> RawTable:
         above = int(lines[0].lower().startswith("sep=") and len(lines) > 1)
         first = lines[above].strip("\r")
         if not first:
-            raise FormatError(f"{path} is empty: it holds no places.", hint=_ROWS)
+            raise FormatError(f"{path} is empty: it holds no rows.", hint=_ROWS)
         mark = max(";\t,", key=first.count)
         names = [name.strip().strip('"') for name in first.split(mark)]
         # 35,0754;33,5311 is how spreadsheets write it in half of Europe.
@@ -121,7 +121,7 @@ def _csv(path: Path, texts: set[str]) -> RawTable:
         raise FormatError(f"{path} cannot be read: {error}.") from None
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         if "Empty CSV" in str(error):
-            raise FormatError(f"{path} is empty: it holds no places.", hint=_ROWS) from None
+            raise FormatError(f"{path} is empty: it holds no rows.", hint=_ROWS) from None
         hint = _UTF_8
         if "Expected" in str(error) and b"\0" not in head:
             hint = "Each row has as many values as the first: quote texts that hold commas."
@@ -193,7 +193,7 @@ def _vector(path: Path, layer: str | None) -> RawTable:
         if layer is None and len(layers) > 1:
             raise FormatError(
                 f"{path} has {len(layers)} layers: {', '.join(layers[:8])}.",
-                hint="Say which one holds the places: --layer NAME.",
+                hint="Say which one is meant: --layer NAME.",
             )
         meta, table = pyogrio.read_arrow(path, layer=layer)
     except (DataSourceError, DataLayerError) as error:

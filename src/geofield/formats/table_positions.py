@@ -129,7 +129,7 @@ def check_positions(raw: RawTable, lat: Any, lon: Any, row: Any, source: CRS) ->
     if (np.isnan(lat) | np.isnan(lon)).all():
         raise FormatError(
             f"{raw.name} holds no row with a position.",
-            hint="Give each field a latitude and a longitude, or a shape.",
+            hint="Give each row a latitude and a longitude, or a shape.",
         )
     wrong = np.flatnonzero((np.abs(lat) > 90) | (np.abs(lon) > 180))
     if not len(wrong):
