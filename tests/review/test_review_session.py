@@ -132,6 +132,29 @@ def test_tracks_turn_with_a_dragged_line(plan: Plan) -> None:
     assert session.plan.tracks.heading_deg == pytest.approx(45.0, abs=2.0)
 
 
+def test_an_outline_drawn_anew_keeps_what_was_cut_out_of_it(plan: Plan) -> None:
+    """The pond was field again, without a word, while the map went on showing it."""
+    field = plan.field.polygon
+    middle = field.representative_point()
+    pond, well = middle.buffer(9), shapely.Point(middle.x, middle.y - 40).buffer(4)
+    session = Session(replace(plan, field=replace(plan.field, polygon=field - pond - well)))
+    x0, y0, x1, y1 = pond.buffer(20).bounds
+    corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
+    assert not shapely.box(x0, y0, x1, y1).intersects(well)
+    session.do({"do": "outline", "ring": corners})
+    drawn = session.plan.field.polygon
+    assert drawn.equals(shapely.box(x0, y0, x1, y1) - pond)
+    assert session.plan.field.method == "drawn"
+    # A border across the pond goes around it; one that leaves pieces only is refused.
+    session.do({"do": "outline", "ring": [[middle.x, y0], [x1, y0], [x1, y1], [middle.x, y1]]})
+    assert session.plan.field.polygon.disjoint(pond.buffer(-0.01))
+    session.undo()
+    y = middle.y
+    with pytest.raises(GeofieldError, match="no single piece"):
+        session.do({"do": "outline", "ring": [[x0, y - 2], [x1, y - 2], [x1, y + 2], [x0, y + 2]]})
+    assert session.plan.field.polygon.equals(drawn)
+
+
 @pytest.mark.parametrize(
     ("command", "words"),
     [

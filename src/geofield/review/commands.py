@@ -127,8 +127,15 @@ def delete(plan: Plan, command: Command) -> Plan:
 
 
 def set_outline(plan: Plan, command: Command) -> Plan:
-    """The outline as a person drew it: ``rings``, the outer one first."""
-    field = replace(plan.field, polygon=_polygon(command["rings"], "outline"))
+    """The outline as a person drew it: ``rings``, the outer one first, or the outer ``ring`` alone.
+
+    Where the outer one alone was drawn, what was cut out of the field stays cut out.
+    """
+    if "ring" in command:
+        drawn = _without_holes_of(plan.field.polygon, _polygon([command["ring"]], "outline"))
+    else:
+        drawn = _polygon(command["rings"], "outline")
+    field = replace(plan.field, polygon=drawn)
     if plan.grid is not None:
         frame = Polygon(plan.grid.corners_lonlat())
         if not frame.intersects(field.polygon_lonlat):  # a part may be beyond its edge
@@ -286,6 +293,16 @@ def places_of(values: Any) -> list[tuple[float, float]]:
     if not (np.abs(places) < _FAR).all():
         raise EditError("A place is two numbers, x and y.")
     return places
+
+
+def _without_holes_of(before: Polygon, drawn: Polygon) -> Polygon:
+    cut = drawn.difference(shapely.union_all([Polygon(hole) for hole in before.interiors]))
+    if not isinstance(cut, Polygon) or cut.is_empty:
+        raise EditError(
+            "The holes in the outline leave no single piece of what was drawn.",
+            hint="Draw wider around them.",
+        )
+    return shapely.orient_polygons(cut)
 
 
 def _polygon(rings: Any, what: str) -> Polygon:

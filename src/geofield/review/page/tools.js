@@ -99,7 +99,7 @@ const MAKERS = {
   ground: () => [],
   notground: () => [],
   polygon: () => [shape("Polygon", geometry => ({do: "polygon", ring: ring(geometry)}))],
-  anew: () => [shape("Polygon", geometry => ({do: "outline", rings: [ring(geometry)]}), true)],
+  anew: () => [shape("Polygon", geometry => ({do: "outline", ring: ring(geometry)}), true)],
   outline() {
     const modify = new ol.interaction.Modify({source: maps.sources.outline, pixelTolerance: 2 * reach});
     // The shape under the hand counts: the answer to the edit before may draw the outline anew meanwhile.
