@@ -264,3 +264,22 @@ def test_a_shape_round_a_pole_is_refused_in_degrees() -> None:
     ring = shapely.Polygon([(x, 89.99) for x in range(-180, 180, 20)])
     with pytest.raises(FormatError, match="round a pole"):
         split(np.array([ring]))
+
+
+@pytest.mark.parametrize("lonlat", [
+    [(179.99, 1), (180.01, 1.01), (180.01, 1), (179.99, 1.01)],
+    [(179.99, 1), (180.01, 1), (179.99, 1)],
+    [(179.99, 1), (180.02, 1), (180.02, 1.1), (180.01, 1.1), (180.01, 0.9), (179.9, 0.9)],
+    [(179.9, 1), (180, 1), (180.1, 1), (180.1, 1.1), (180, 1.1), (179.9, 1.1)],
+])  # fmt: skip
+def test_a_line_that_crosses_itself_and_the_180th_meridian_is_driven_as_before(lonlat):
+    """Joined by places, it came back in several pieces, or ground driven twice counted once."""
+    line = shapely.LineString([(x - 360.0 * (x > 180.0), y) for x, y in lonlat])
+    (cut,) = split(np.array([line]))
+    assert np.abs(shapely.get_coordinates(cut)[:, 0]).max() == 180.0
+    (back,) = joined(np.array([cut]), LONLAT)
+    assert back.geom_type == "LineString"
+    assert back.length == pytest.approx(shapely.LineString(lonlat).length, abs=1e-9)
+    corners = shapely.get_coordinates(back)[:, 0] != 180.0
+    inner = [corner for corner in lonlat if corner[0] != 180]
+    assert shapely.get_coordinates(back)[corners] == pytest.approx(np.array(inner), abs=1e-9)

@@ -102,17 +102,49 @@ def _split(whole: NDArray[np.object_]) -> list[Any]:
             "pole never is.",
             hint="Formats in metres carry it: gpkg, geoparquet, flatgeobuf, dxf.",
         )
+    return [_collected(_cut(each)) for each in whole]
+
+
+def _cut(whole: Any) -> list[Any]:
+    """The pieces of a shape on either side; those of lines in the order in which they are driven.
+
+    As sets of places, lines that cross or follow themselves would lose that order.
+    """
+    if whole.geom_type.endswith("LineString"):
+        return [piece for line in shapely.get_parts(whole) for piece in _legs_by_side(line)]
     west = shapely.transform(shapely.intersection(whole, _WEST), lambda xy: xy - (360.0, 0.0))
-    east = shapely.intersection(whole, _EAST)
-    return [_collected(*parts) for parts in zip(east, west, strict=True)]
+    return [shapely.intersection(whole, _EAST), west]
+
+
+def _legs_by_side(line: Any) -> list[Any]:
+    lonlat = shapely.get_coordinates(line)
+    beyond = lonlat[:, 0] > 180.0
+    at = np.flatnonzero(beyond[1:] != beyond[:-1])
+    start, end = lonlat[at], lonlat[at + 1]
+    share = (180.0 - start[:, 0]) / (end[:, 0] - start[:, 0])
+    crossings = np.column_stack([np.full(len(at), 180.0),
+                                 start[:, 1] + share * (end[:, 1] - start[:, 1])])  # fmt: skip
+    pieces = np.split(np.insert(lonlat, np.repeat(at + 1, 2), np.repeat(crossings, 2, axis=0),
+                                axis=0), at + 2 + 2 * np.arange(len(at)))  # fmt: skip
+    lines: list[Any] = [shapely.linestrings(each - (360.0 * (each[:, 0] > 180.0).any(), 0.0))
+             for each in pieces]  # fmt: skip
+    return [shapely.remove_repeated_points(each) for each in lines if each.length > 0.0]
 
 
 def _as_one(whole: Any) -> Any:
     parts = shapely.get_parts(whole)
     if len(parts) == 1:
         return whole
-    whole = shapely.union_all(shapely.transform(parts, _on_the_meridian))
-    return shapely.line_merge(whole) if shapely.get_dimensions(whole) == 1 else whole
+    parts = shapely.transform(parts, _on_the_meridian)
+    if whole.geom_type != "MultiLineString":
+        return shapely.union_all(parts)
+    runs = [shapely.get_coordinates(parts[0])]
+    for legs in map(shapely.get_coordinates, parts[1:]):
+        met = np.abs(legs[0] - runs[-1][-1]).max() < _SNAP_DEG and legs[0, 0] == 180.0
+        runs = [*runs[:-1], np.concatenate([runs[-1], legs[1:]])] if met else [*runs, legs]
+    # Of other programs, the parts may be in any order.
+    lines: list[Any] = [shapely.linestrings(run) for run in runs]
+    return shapely.line_merge(shapely.multilinestrings(lines))
 
 
 def _positive(lonlat: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -125,7 +157,7 @@ def _on_the_meridian(lonlat: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.column_stack([np.where(near, 180.0, lonlat[:, 0]), lonlat[:, 1]])
 
 
-def _collected(*pieces: Any) -> Any:
+def _collected(pieces: list[Any]) -> Any:
     """The pieces of both sides as one shape; what only touches the meridian has no piece."""
     parts = shapely.get_parts(np.array(pieces))
     dimensions = shapely.get_dimensions(parts)
