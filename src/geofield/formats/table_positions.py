@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import geopandas as gpd
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 import shapely
 from numpy.typing import NDArray
 from pyproj import CRS
@@ -91,31 +91,38 @@ def found(raw: RawTable, asked: str | None, usual: Sequence[str]) -> str | None:
     return asked
 
 
+def _plain(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
 def degrees(raw: RawTable, name: str, letters: str) -> NDArray[np.float64]:
     """A column's latitudes or longitudes, which may be written as for the options."""
-    try:
-        return _numbers(raw, name)
-    except FormatError:
-        texts = [(text or "").strip() for text in raw.table[name].to_pylist()]
-        angles = [np.nan if text.lower() in _MISSING else angle_of(text, letters) for text in texts]
-        if None in angles:
-            raise
-        return np.array(angles, dtype=np.float64)
+    return _numbers(raw, name, lambda text: angle_of(text, letters), "35.0754 or 35 4.524 N")
 
 
-def _numbers(raw: RawTable, name: str) -> NDArray[np.float64]:
-    """A column's numbers; missing ones are not a number."""
+def _numbers(
+    raw: RawTable,
+    name: str,
+    understood: Callable[[str], float | None] = _plain,
+    example: str = "533812.5",
+) -> NDArray[np.float64]:
+    """A column's numbers, of texts what is `understood`; missing ones are not a number."""
     column = raw.table[name]
-    try:
-        if pa.types.is_string(column.type) or pa.types.is_large_string(column.type):
-            column = pc.utf8_trim_whitespace(column)
-            column = pc.if_else(pc.equal(column, ""), None, column)
+    with suppress(pa.ArrowInvalid, pa.ArrowNotImplementedError):
         return np.asarray(column.cast(pa.float64()).to_numpy(), dtype=np.float64)
-    except pa.ArrowInvalid as error:
+    texts = ["" if each is None else str(each).strip() for each in column.to_pylist()]
+    found = [np.nan if text.lower() in _MISSING else understood(text) for text in texts]
+    wrong = [row for row, number in enumerate(found) if number is None]
+    if wrong:
+        rows = some_of([str(row + 1) for row in wrong], 5)
         raise FormatError(
-            f"{raw.name}: column {name!r} holds something that is no number ({error}).",
-            hint="Write degrees as 35.0754 or 35 4.524 N.",
-        ) from None
+            f"{raw.name}: column {name!r}, row {rows}: {texts[wrong[0]]!r} is no number.",
+            hint=f"Write {example}; rows are counted from 1 below the columns' names.",
+        )
+    return np.array(found, dtype=np.float64)
 
 
 def check_positions(raw: RawTable, lat: Any, lon: Any, row: Any, source: CRS) -> None:
