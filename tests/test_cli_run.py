@@ -231,7 +231,7 @@ def test_wrong_pictures(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     out, where = tmp_path / "out", point(simulated)
-    assert "missing.tif" in fails(capsys, out, tmp_path / "missing.tif", *where)
+    assert "missing.tif" in fails(capsys, out, tmp_path / "missing.tif", *where, code=2)
     text = tmp_path / "text.tif"
     text.write_text("this is no picture")
     assert "text.tif" in fails(capsys, out, text, *where)

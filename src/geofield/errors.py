@@ -187,6 +187,12 @@ class UnknownFormatError(FormatError):
     exit_code = 2
 
 
+class MissingFileError(FormatError, ImageryError):
+    """A file, picture or query was named that is not there: wrong usage, not work that failed."""
+
+    exit_code = 2
+
+
 class OutputExistsError(FormatError):
     """The product is there already and overwriting was not asked for."""
 

@@ -453,10 +453,10 @@ def test_what_a_person_put_back_stays(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (("none.csv", "--out", "farm"), 1, "no file none.csv"),
+        (("none.csv", "--out", "farm"), 2, "no file none.csv"),
         (("empty.csv", "--out", "farm"), 1, "empty"),
         (("points.csv", "--out", "farm"), 1, "points"),
-        (("points.csv", "none.tif", "--out", "farm"), 1, "none.tif"),
+        (("points.csv", "none.tif", "--out", "farm"), 2, "none.tif"),
         (("p.gpkg", "--id-column", "nr", "--out", "farm"), 1, "no column 'nr'"),
         (("p.gpkg", "--id-column", "crop", "--out", "farm"), 1, "more than once"),
         (("p.gpkg", "google", "--out", "farm"), 1, "forbid"),

@@ -137,8 +137,8 @@ def test_the_middle_of_an_area_need_not_be_seen(right_px: int, width_px: int) ->
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        (["tiles", "naipp", *POINT, "-o", "a.tif"], 1, "Did you mean 'naip'"),
-        (["tiles", "none.tif", *POINT, "-o", "a.tif"], 1, "There is no picture none.tif"),
+        (["tiles", "naipp", *POINT, "-o", "a.tif"], 2, "Did you mean 'naip'"),
+        (["tiles", "none.tif", *POINT, "-o", "a.tif"], 2, "There is no picture none.tif"),
         (["tiles", "naip", "-o", "a.tif"], 2, "--lat and --lon, or --area"),
         (["tiles", "naip", *POINT, "--size", "9", "--size-m", "9", "-o", "a"], 2, "not both"),
         (["tiles", "naip", *POINT, "--zoom", "deep", "-o", "a.tif"], 2, "a number, max or fit"),
@@ -147,8 +147,8 @@ def test_the_middle_of_an_area_need_not_be_seen(right_px: int, width_px: int) ->
         (["tiles", "google", *POINT, "-o", "a.tif"], 1, "GEOFIELD_KEY_GOOGLE"),
         (["tiles", "naip", *POINT, "-o", "no/a.tif"], 1, "folder exists"),
         (["tiles", "naip", *POINT, "-o", "a.jpg"], 2, "write NAME.tif"),
-        (["tiles", "", *POINT, "-o", "a.tif"], 1, "no imagery source or file ''"),
-        (["field", "", *POINT, "-o", "a.gpkg"], 1, "no imagery source or file ''"),
+        (["tiles", "", *POINT, "-o", "a.tif"], 2, "no imagery source or file ''"),
+        (["field", "", *POINT, "-o", "a.gpkg"], 2, "no imagery source or file ''"),
         (["tiles", "naip", *POINT, "-o", "a.tif", "--offline"], 1, "not in the cache"),
         (["tiles", "naip", *POINT, "-o", "a.tif", "--offline", "--no-cache"], 1, "needs a cache"),
     ],
@@ -190,7 +190,7 @@ def test_one_of_several_pictures_in_a_geopackage_is_named_as_gdal_does(
     assert "480 x 480 px" in capsys.readouterr().out
     with pytest.raises(FormatError, match="is an input"), staged_file("a.gpkg", inputs=[july]):
         pass
-    assert run("info", "GPKG:none.gpkg:JULY") == 1
+    assert run("info", "GPKG:none.gpkg:JULY") == 2
     assert "no picture none.gpkg" in capsys.readouterr().err
 
 

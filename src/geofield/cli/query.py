@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from geofield.cli.console import echo_json, say
-from geofield.errors import FormatError
+from geofield.errors import FormatError, MissingFileError
 from geofield.wording import counted, nearest
 
 
@@ -72,7 +72,7 @@ def _own(name: str, known: list[str]) -> str:
             return path.read_text(encoding="utf-8")
         except UnicodeDecodeError:
             raise FormatError(f"{name} is no text in UTF-8.", hint="Save it as UTF-8.") from None
-    raise FormatError(
+    raise MissingFileError(
         f"There is no query {name!r}, and no file of SPARQL of that name.",
         hint=nearest(name, known).strip() or f"Queries: {', '.join(known)}.",
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from geofield.cli.console import echo_json, say
-from geofield.cli.files import PATH
+from geofield.cli.files import OLD_PATH
 from geofield.errors import FormatError
 from geofield.wording import counted
 
@@ -21,7 +21,7 @@ Examples (on the project's own sample):
   geofield validate export/isoxml/TASKDATA/TASKDATA.XML --json
 """
 )
-@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=PATH)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=OLD_PATH)
 @click.option("--json", "as_json", is_flag=True, help="Print the findings as JSON on stdout.")
 @click.pass_context
 def validate(context: click.Context, files: tuple[Path, ...], as_json: bool) -> None:

@@ -15,7 +15,7 @@ import pyarrow.compute as pc
 from geofield.earlier import is_planned
 from geofield.errors import FieldWarning, FormatError
 from geofield.farm.edited_in_place import edited_in_place
-from geofield.farm.folder import REVIEWED, STATUS, Record, read_part, read_parts, write_chunk
+from geofield.farm.folder import REVIEWED, STATUS, read_part, read_parts, write_chunk
 from geofield.farm.folder import file_of as file_in
 from geofield.farm.layers import FIELD_ID, KEPT, stacked, tables_of
 from geofield.farm.marks import CHANGED
@@ -63,8 +63,6 @@ def put_back(plan_file: Path, folder: str | Path, *, anyway: bool = False) -> st
         When its tracks were planned again.
     """
     store = Store.of(folder)
-    if Record.read(store) is None:
-        raise FormatError(f"{folder} is no farm of geofield.", hint="Make one: geofield batch.")
     plan, farm = read_plan(plan_file), read_farm(folder)
     field_id = plan.field.field_id
     chunks = _chunks_with(store, {field_id})

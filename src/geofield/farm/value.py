@@ -14,7 +14,7 @@ import pyarrow.compute as pc
 import shapely
 
 from geofield import schema
-from geofield.errors import FormatError, OutputExistsError
+from geofield.errors import FormatError, MissingFileError, OutputExistsError
 from geofield.farm import folder as place
 from geofield.farm.failed import FAILED
 from geofield.farm.layers import (
@@ -340,7 +340,9 @@ def read_farm(folder: str | Path) -> Farm:
     """
     store = Store.of(folder)
     if place.Record.read(store) is None:
-        raise FormatError(
+        # At an address there is nothing but the farm.
+        missing = FormatError if Path(folder).exists() else MissingFileError
+        raise missing(
             f"{folder} is no farm of geofield: there is no {place.RECORD}.",
             hint="Make one with `geofield batch PLACES --out FARM/`.",
         )

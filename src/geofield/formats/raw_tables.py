@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import shapely
 
-from geofield.errors import CRSError, FormatError
+from geofield.errors import CRSError, FormatError, MissingFileError
 from geofield.formats.catalogue import PARQUET
 from geofield.formats.foreign import refuse_layer
 from geofield.formats.row_crs import refuse_other_rows
@@ -58,7 +58,7 @@ def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> R
         When the file is missing, damaged, or has several layers of which none was named.
     """
     if not path.exists():
-        raise FormatError(
+        raise MissingFileError(
             f"There is no file {path}.", hint="It is a file with a row per field or obstacle."
         )
     if path.suffix.lower() in (*CSV, *PARQUET):

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from geofield.errors import FormatError, UnknownFormatError
+from geofield.errors import FormatError, MissingFileError, UnknownFormatError
 from geofield.formats.catalogue import CATALOGUE
 from geofield.formats.format import Drop, Format
 from geofield.strangers import check_vector, is_geopackage
@@ -55,7 +55,7 @@ def detect(path: Path | str) -> Format:
     """
     place = Path(path)
     if not place.exists():
-        raise FormatError(f"There is no file {place}.", hint="Check the path.")
+        raise MissingFileError(f"There is no file {place}.", hint="Check the path.")
     if place.is_dir():
         return _detect_folder(place)
     for each in FORMATS.values():

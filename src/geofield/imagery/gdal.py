@@ -16,7 +16,7 @@ from rasterio.io import DatasetReader
 
 from geofield import __version__
 from geofield.crs import parse_crs
-from geofield.errors import CRSError, ImageryError
+from geofield.errors import CRSError, ImageryError, MissingFileError
 from geofield.imagery.damage import made_up
 from geofield.imagery.reach import OWN_FOLDER, Reach
 from geofield.imagery.vrt import check_beside, check_vrt
@@ -108,7 +108,7 @@ def open_picture(path: str, reach: Reach = OWN_FOLDER, *, placed: bool = False) 
     if not is_remote(path) and not path.startswith(("/vsi", "<")) and "://" not in path:
         file = picture_file(path)
         if not file.exists():
-            raise ImageryError(
+            raise MissingFileError(
                 f"There is no picture {file}.", hint="Check the path; it must name a raster file."
             )
         if file.is_file() and file.stat().st_size == 0:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pyoxigraph as ox
 
-from geofield.errors import FormatError
+from geofield.errors import FormatError, MissingFileError
 from geofield.formats.rdf.guard import check_json, check_xml
 
 #: File endings and their syntax; XML and JSON only where the ending says RDF.
@@ -38,7 +38,7 @@ def parse(path: Path) -> Iterator[ox.Quad]:
             hint=f"Known endings: {', '.join(SYNTAXES)}.",
         )
     if not path.is_file():
-        raise FormatError(f"There is no file {path}.")
+        raise MissingFileError(f"There is no file {path}.", hint="Check the path.")
     if syntax == ox.RdfFormat.RDF_XML:
         with path.open("rb") as file:
             check_xml(file, path.name)

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 from PIL import Image, UnidentifiedImageError
 
-from geofield.errors import ImageryError
+from geofield.errors import ImageryError, MissingFileError
 from geofield.imagery.client import BrokenBodyError
 from geofield.imagery.terms import Terms
 from geofield.imagery.tiling import Tile, TilePyramid
@@ -37,7 +37,7 @@ class MBTilesSource:
         """Look at an MBTiles file; its metadata say who made it where the terms do not."""
         file = Path(path)
         if not file.is_file():
-            raise ImageryError(f"There is no file {path}.", hint="Check the path.")
+            raise MissingFileError(f"There is no file {path}.", hint="Check the path.")
         try:
             with database(file, timeout_s=_BUSY_S) as db:
                 words = dict(db.execute("SELECT name, value FROM metadata").fetchall())

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from geofield.errors import ImageryError
+from geofield.errors import ImageryError, MissingFileError
 from geofield.imagery.client import Client
 from geofield.imagery.gdal import display_name
 from geofield.imagery.reach import Reach
@@ -175,11 +175,11 @@ def _unknown(what: str, catalogue: Mapping[str, SourceEntry]) -> ImageryError:
     near = nearest(what.lower(), catalogue, cutoff=0.5)
     looks_like_path = "/" in what or "\\" in what or file.suffix != ""
     if looks_like_path and not near:
-        return ImageryError(
+        return MissingFileError(
             f"There is no picture {file}.",
             hint="Check the path. `geofield sources` lists the sources known by name.",
         )
-    return ImageryError(
+    return MissingFileError(
         f"There is no imagery source or file {what!r}.",
         hint=f"{near} `geofield sources` lists them; an address or a path will do too.".strip(),
     )
