@@ -249,7 +249,7 @@ def _names(
 
 def _texts(column: Any) -> Any:
     """A column as text; whole numbers without a point, what is empty missing."""
-    if pa.types.is_floating(column.type):
+    if pa.types.is_floating(column.type) or pa.types.is_nested(column.type):
         texts = [None if one is None else cell_text(one) for one in column.to_pylist()]
         column = pa.chunked_array([pa.array(texts, pa.string())])
     text = pc.utf8_trim_whitespace(column.cast(pa.string()).combine_chunks())

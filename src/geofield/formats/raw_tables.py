@@ -18,9 +18,11 @@ import shapely
 from geofield.errors import CRSError, FormatError, MissingFileError
 from geofield.formats.catalogue import PARQUET
 from geofield.formats.foreign import refuse_layer
+from geofield.formats.registry import detect
 from geofield.formats.row_crs import refuse_other_rows
+from geofield.formats.zipped import unpacked
 from geofield.strangers import check_vector, unreadable
-from geofield.wording import nearest
+from geofield.wording import command, nearest
 
 CSV = (".csv", ".tsv", ".txt")
 _ROWS = "Give a row of names, and one per field or obstacle."
@@ -61,6 +63,9 @@ def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> R
         raise MissingFileError(
             f"There is no file {path}.", hint="It is a file with a row per field or obstacle."
         )
+    if path.suffix.lower() == ".zip":
+        with unpacked(path) as folder:
+            return read_raw(_only_file(path, folder, layer), layer=layer, texts=texts)
     if path.suffix.lower() in (*CSV, *PARQUET):
         refuse_layer(path, layer)
     if path.suffix.lower() in CSV:
@@ -68,6 +73,29 @@ def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> R
     if path.suffix.lower() in PARQUET:
         return _parquet(path)
     return _vector(path, layer)
+
+
+def _only_file(archive: Path, folder: Path, layer: str | None) -> Path:
+    """The file of rows in a folder that was unpacked; of several, the one called like `layer`."""
+    suffixes = detect(folder).suffixes
+    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in suffixes)
+    if len(files) == 1:
+        return files[0]
+    if not files:
+        raise FormatError(f"{archive} holds no file of places.", hint=_ROWS)
+    named = [file for file in files if file.stem == layer]
+    if len(named) != 1:
+        raise _several(archive, [file.stem for file in files])
+    return named[0]
+
+
+def _several(path: Path, layers: Sequence[str]) -> FormatError:
+    """That a file has several layers: one field among them is found, one of many fields named."""
+    return FormatError(
+        f"{path} has {len(layers)} layers: {', '.join(layers[:8])}.",
+        hint=f"Find the field in them: {command('import', path, '-o', 'field.gpkg')} (or name the "
+        "layer of places to `geofield batch`: --layer NAME).",
+    )
 
 
 def raw_of(frame: pd.DataFrame) -> RawTable:
@@ -191,11 +219,13 @@ def _vector(path: Path, layer: str | None) -> RawTable:
         if layer is None and "field" in layers:
             layer = "field"
         if layer is None and len(layers) > 1:
-            raise FormatError(
-                f"{path} has {len(layers)} layers: {', '.join(layers[:8])}.",
-                hint="Say which one is meant: --layer NAME.",
-            )
+            raise _several(path, layers)
         meta, table = pyogrio.read_arrow(path, layer=layer)
+        try:
+            table.validate(full=True)
+        except pa.ArrowInvalid:  # as of a Shapefile that does not say its encoding
+            table = pyogrio.read_arrow(path, layer=layer, encoding=meta["encoding"])[1]
+            table.validate(full=True)
     except (DataSourceError, DataLayerError) as error:
         raise unreadable(path, error) from None
     except (UnicodeDecodeError, pa.ArrowInvalid) as error:

@@ -81,7 +81,11 @@ def unpacked(path: Path) -> Iterator[Path]:
                     continue
                 entry.filename = "/".join(parts)
                 archive.extract(entry, folder)
-            yield _innermost(folder)
+            try:
+                yield _innermost(folder)
+            except FormatError as error:  # where it was unpacked tells a person nothing
+                error.message = error.message.replace(str(folder), str(path))
+                raise
     # OSError: a place in the archive that is none, as a bad entry names it.
     except (zipfile.BadZipFile, zlib.error, RuntimeError, EOFError, OSError) as error:
         raise FormatError(f"{path} cannot be unpacked: {error}.", hint="Is it whole?") from error
