@@ -156,7 +156,9 @@ class Format:
         if self.reader is None:
             raise FormatError(
                 f"{self.title} can be written, not read.",
-                hint="`geofield formats` lists what can be read.",
+                hint="`geofield formats` lists what can be read. Of what else GDAL reads, "
+                "`ogr2ogr NAME.gpkg FILE` makes a GeoPackage (-a_srs EPSG:CODE where it does not "
+                "say its CRS, as DXF never does).",
             )
         return resolve_name(self.reader)  # type: ignore[no-any-return]
 
