@@ -217,9 +217,9 @@ def test_an_obstacle_of_two_parts_becomes_two(dataset, tmp_path):
 def test_text_where_numbers_belong(dataset, tmp_path):
     write_dataset(dataset, tmp_path, ["gpkg"])
     table = dataset.table("obstacles").copy()
-    table["radius_m"] = ["about three", None, None, None]
+    table["radius_m"] = [None, "2.5", "about three", None]
     table.to_file(tmp_path / "field.gpkg", layer="obstacles", driver="GPKG")
-    with pytest.raises(FormatError, match="'radius_m' holds something that is no number"):
+    with pytest.raises(FormatError, match="'radius_m', row 3: 'about three' is no number"):
         read_dataset(tmp_path / "field.gpkg")
 
 

@@ -118,9 +118,11 @@ def conform(of: Layer, frame: gpd.GeoDataFrame, *, extras: bool = False) -> gpd.
             try:
                 series = pd.to_numeric(series)
             except (ValueError, TypeError) as error:
+                known = series.isna() | pd.to_numeric(series, errors="coerce").notna()
+                row = int((~known).to_numpy().argmax())
                 raise FormatError(
-                    f"Layer {of.name!r}: column {column.name!r} holds something that is no "
-                    f"number ({error}).",
+                    f"Layer {of.name!r}: column {column.name!r}, row {row + 1}: "
+                    f"{str(series.iloc[row])!r} is no number.",
                     hint="Correct the column, or leave the cell empty.",
                 ) from error
         if column.type == "int":
