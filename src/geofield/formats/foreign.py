@@ -322,7 +322,7 @@ def _with_crs(frame: gpd.GeoDataFrame, where: str, crs: CRS | None) -> gpd.GeoDa
     raise FormatError(
         f"{where} does not say its CRS, and x {west:.0f} to {east:.0f}, y {south:.0f} to "
         f"{north:.0f} could be metres or feet of any projection.",
-        hint="Name it, for instance --crs EPSG:32633.",
+        hint="Name it, for instance --crs EPSG:32633 (UTM zone 33 north).",
     )
 
 

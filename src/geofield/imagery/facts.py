@@ -106,6 +106,6 @@ def crs_of(dataset: Any, path: str) -> CRS:
     if not found:
         raise CRSError(
             f"The picture {display_name(path)} does not name its coordinate reference system.",
-            hint="Name it: --crs EPSG:32633, or crs=... in Python.",
+            hint="Name it, for instance --crs EPSG:32633 (UTM zone 33 north); in Python crs=...",
         )
     return to_pyproj(found)

@@ -91,7 +91,8 @@ def find_place(dataset: Any, crs: CRS, *, point: LonLat | None = None) -> Place:
     if crs.is_geocentric or crs.is_vertical or crs.is_engineering:
         raise CRSError(
             f"{crs.name} is not the CRS of a map.",
-            hint="Reproject the picture first, or name its CRS: --crs EPSG:32633.",
+            hint="Reproject the picture first, or name its CRS, for instance --crs EPSG:32633 "
+            "(UTM zone 33 north).",
         )
     if transform.is_identity:
         if len(gcps) < 3:
