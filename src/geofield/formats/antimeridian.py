@@ -122,12 +122,16 @@ def _legs_by_side(line: Any) -> list[Any]:
     at = np.flatnonzero(beyond[1:] != beyond[:-1])
     start, end = lonlat[at], lonlat[at + 1]
     share = (180.0 - start[:, 0]) / (end[:, 0] - start[:, 0])
-    crossings = np.column_stack([np.full(len(at), 180.0),
-                                 start[:, 1] + share * (end[:, 1] - start[:, 1])])  # fmt: skip
-    pieces = np.split(np.insert(lonlat, np.repeat(at + 1, 2), np.repeat(crossings, 2, axis=0),
-                                axis=0), at + 2 + 2 * np.arange(len(at)))  # fmt: skip
-    lines: list[Any] = [shapely.linestrings(each - (360.0 * (each[:, 0] > 180.0).any(), 0.0))
-             for each in pieces]  # fmt: skip
+    crossings = np.column_stack(
+        [np.full(len(at), 180.0), start[:, 1] + share * (end[:, 1] - start[:, 1])]
+    )
+    pieces = np.split(
+        np.insert(lonlat, np.repeat(at + 1, 2), np.repeat(crossings, 2, axis=0), axis=0),
+        at + 2 + 2 * np.arange(len(at)),
+    )
+    lines: list[Any] = [
+        shapely.linestrings(each - (360.0 * (each[:, 0] > 180.0).any(), 0.0)) for each in pieces
+    ]
     return [shapely.remove_repeated_points(each) for each in lines if each.length > 0.0]
 
 
@@ -148,8 +152,9 @@ def _as_one(whole: Any) -> Any:
 
 
 def _positive(lonlat: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.column_stack([np.where(lonlat[:, 0] < 0, lonlat[:, 0] + 360, lonlat[:, 0]),
-                            lonlat[:, 1]])  # fmt: skip
+    return np.column_stack(
+        [np.where(lonlat[:, 0] < 0, lonlat[:, 0] + 360, lonlat[:, 0]), lonlat[:, 1]]
+    )
 
 
 def _on_the_meridian(lonlat: NDArray[np.float64]) -> NDArray[np.float64]:
