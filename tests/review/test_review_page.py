@@ -711,6 +711,13 @@ def test_a_track_that_a_person_bent_is_shown_as_it_is(
         assert "route" not in page.text("figures")
         assert page.state()["route"]
         assert bent in driver.execute_async_script(shown)
+        page.press("j", "c")
+        page.wait(lambda: "route planned on saving" in page.text("figures"))
+        page.run("document.getElementById('more').click()")
+        page.run("document.getElementById('export-format').value = 'geojson'")
+        page.run("document.getElementById('export').click()")
+        page.wait(lambda: "geojson" in page.text("message"))
+        assert "route" not in page.text("figures")  # it was planned for the export
     tracks = read_plan(bent_path).tracks
     assert tracks is not None
     (saved,) = [one for one in tracks.segments.geometry if len(one.coords) > 2]

@@ -720,7 +720,7 @@ def test_edits_wait_for_no_route_and_what_is_written_has_it(
     desk.preview(edit)
     told = desk.edit(edit)
     assert (len(asked), told["route"], told["route_waits"]) == (1, [], True)
-    desk.export("geojson")
+    assert desk.export("geojson")["state"]["route_waits"] is False
     assert (plan_path.parent / "export/field/geojson/route.geojson").exists()
     assert desk.edit({"do": "undo"})["route"] == first["route"]
     redone = desk.edit({"do": "redo"})

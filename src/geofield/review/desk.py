@@ -251,9 +251,10 @@ class Desk:
             written = write_dataset(
                 dataset, folder, [name], stem=stem, overwrite=True, inputs=[self.path]
             )
+            state = self._state()  # the route is planned now, if it waited
         within = Path(*exports.parts[-2:])
         made = dict.fromkeys(str(within / path.relative_to(exports).parts[0]) for path in written)
-        return {"files": list(made), "notes": [str(one) for one in heard]}
+        return {"files": list(made), "notes": [str(one) for one in heard], "state": state}
 
     def _exports(self) -> tuple[Path, str]:
         """The folder of exports, one for each plan as their names are the same, and their stem."""

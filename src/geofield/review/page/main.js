@@ -5,6 +5,7 @@ import * as maps from "./map.js";
 import * as tools from "./tools.js";
 import {legend} from "./web/symbols.js";
 import {listen, keyTable} from "./keys.js";
+import {say, speak} from "./voice.js";
 import {currentLanguage, heading, label, number, plain, setLanguage, t, told} from "./web/words.js";
 
 const $ = id => document.getElementById(id);
@@ -13,31 +14,6 @@ const row = no => state.obstacles.find(each => each.no === no);
 const waits = each => each.status === "detected" || each.status === "possible";
 
 // -- saying ------------------------------------------------------------------------------
-
-let silence;
-function say(text, bad = false, button = null) {
-  const node = $("message");
-  // Beside an open dialog nothing can be read or pressed.
-  (document.querySelector("dialog[open]") ?? document.body).append(node);
-  node.textContent = text;
-  node.classList.toggle("bad", bad);
-  node.classList.toggle("on", Boolean(text));
-  if (button) {
-    const press = document.createElement("button");
-    press.textContent = button.text;
-    press.onclick = button.act;
-    node.append(" ", press);
-  }
-  clearTimeout(silence);
-  if (text && !button) silence = setTimeout(() => say(""), Math.max(bad ? 9000 : 4000, 60 * text.length));
-}
-
-// For those who hear the page: what is told in one moment is said together.
-const sentences = [];
-function speak(text) {
-  if (!sentences.length) setTimeout(() => { $("spoken").textContent = sentences.splice(0).join(". "); }, 60);
-  if (!sentences.includes(text)) sentences.push(text);
-}
 
 const named = each => `${t("obstacle")} ${each.no}: ${t(each.status)}`;
 
@@ -382,7 +358,7 @@ async function start() {
     inTurn(apply);
   };
   $("export").onclick = () => applied(() => act(() => api.exportAs($("export-format").value),
-    answer => say([t("exported", {files: answer.files.join(", ")}), ...answer.notes.map(text => told(text))].join("\n"))));
+    ({files, notes, state: now}) => { show(now); say([t("exported", {files: files.join(", ")}), ...notes.map(text => told(text))].join("\n")); }));
   $("save-as").onclick = async () => {
     const name = $("save-name").value.trim();
     if (!name) $("save-name").focus();
