@@ -137,7 +137,8 @@ def test_an_outline_drawn_anew_keeps_what_was_cut_out_of_it(plan: Plan) -> None:
     field = plan.field.polygon
     middle = field.representative_point()
     pond, well = middle.buffer(9), shapely.Point(middle.x, middle.y - 40).buffer(4)
-    session = Session(replace(plan, field=replace(plan.field, polygon=field - pond - well)))
+    cut: Any = field - pond - well
+    session = Session(replace(plan, field=replace(plan.field, polygon=cut)))
     x0, y0, x1, y1 = pond.buffer(20).bounds
     corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
     assert not shapely.box(x0, y0, x1, y1).intersects(well)
