@@ -210,6 +210,8 @@ class Sampler:
         if open_land and rng.random() < self.painted:
             image, other, touched = place_things(rng, image, trees, known)
             known = np.maximum(known, touched)
+        clean = np.ones((5, CROP_PX, CROP_PX), np.float32)
+        clean[:4] = normalised(image, *levels(image)).transpose(2, 0, 1)
         if rng.random() < SPOILED:
             image = spoiled(rng, image)
         low, high = levels(image)
@@ -228,8 +230,8 @@ class Sampler:
                     (rgb @ np.array([0.299, 0.587, 0.114], np.float32))[..., None], 3, axis=2
                 )
             x[:3] = normalised(rgb, low, high).transpose(2, 0, 1)
-        kept = np.array(not self.fine[number], np.float32)
-        return {"x": x, "kept": kept} | targets(trees, valid, other, known * open_land)
+        known_well = {"clean": clean, "kept": np.array(not self.fine[number], np.float32)}
+        return {"x": x} | known_well | targets(trees, valid, other, known * open_land)
 
     def _moved(self, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return a crop turned, mirrored and scaled, with its valid pixels and trees."""
@@ -274,12 +276,29 @@ class Sampler:
 
 
 def spoiled(rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
-    """Return the picture of another camera, light and file (0..255)."""
+    """Return the picture of another camera, light and file (0..255).
+
+    Files have pixels of their own size, larger than those of lessons most often: what is lost
+    there is lost before the picture is enlarged.
+    """
     side = image.shape[0]
-    if rng.random() < 0.2:
-        factor = rng.uniform(1.3, 3.4)
-        small = cv2.resize(image, None, fx=1 / factor, fy=1 / factor, interpolation=cv2.INTER_AREA)
-        image = cv2.resize(small, (side, side), interpolation=cv2.INTER_LINEAR)
+    kind = rng.random()
+    factor = 1.0 if kind < 0.2 else rng.uniform(1.1, 2.0) if kind < 0.75 else rng.uniform(2, 6)
+    if factor > 1:
+        small = (round(side / factor),) * 2
+        image = cv2.resize(image, small, interpolation=cv2.INTER_AREA)
+    image = np.rint(np.clip(in_other_light(rng, image), 0, 255))
+    if rng.random() < 0.6:
+        stored = through_jpeg(image.astype(np.uint8), int(rng.integers(15, 95)))
+        image = stored.astype(np.float32)
+    if factor > 1:
+        how = cv2.INTER_LINEAR if rng.random() < 0.5 else cv2.INTER_CUBIC
+        image = np.clip(cv2.resize(image, (side, side), interpolation=how), 0, 255)
+    return np.ascontiguousarray(np.rint(image), dtype=np.float32)
+
+
+def in_other_light(rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
+    """Return the picture of another camera and light."""
     if rng.random() < 0.25:
         image = cv2.GaussianBlur(image, (0, 0), rng.uniform(0.3, 1.4))
     elif rng.random() < 0.25:
@@ -288,7 +307,7 @@ def spoiled(rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
     if rng.random() < 0.7:
         image = image ** np.float32(np.exp(rng.normal(0, 0.25)))
     if rng.random() < 0.15:
-        image = image * shade(rng, side)[..., None]
+        image = image * shade(rng, image.shape[0])[..., None]
     gain = np.exp(rng.normal(0, 0.12)) * np.exp(rng.normal(0, 0.07, image.shape[2]))
     image = image * gain.astype(np.float32)
     if rng.random() < 0.25:
@@ -301,11 +320,7 @@ def spoiled(rng: np.random.Generator, image: np.ndarray) -> np.ndarray:
     if rng.random() < 0.4:
         noise = rng.standard_normal(image.shape, dtype=np.float32)
         image = image + noise * np.float32(rng.uniform(0.5, 7))
-    image = np.clip(image, 0, 255)
-    if rng.random() < 0.5:
-        stored = through_jpeg(np.rint(image).astype(np.uint8), int(rng.integers(25, 95)))
-        image = stored.astype(np.float32)
-    return np.ascontiguousarray(np.rint(image), dtype=np.float32)
+    return image
 
 
 def shade(rng: np.random.Generator, side: int) -> np.ndarray:
