@@ -15,6 +15,7 @@ from qgis.core import (
     QgsRasterLayer,
     QgsVectorLayer,
 )
+from qgis.PyQt.QtCore import QMetaObject, Qt
 from qgis.PyQt.QtXml import QDomDocument
 
 #: Kept alive until QGIS has shown the layers: it holds no reference of its own.
@@ -123,12 +124,21 @@ def place_layer(layer: QgsMapLayer, group: QgsLayerTreeGroup, place: int, shown:
 
 
 def load_on_completion(plan: str | Path, context: QgsProcessingContext) -> None:
-    """Have Processing load the layers of a plan when the algorithm has ended."""
+    """Have Processing load the layers of a plan when the algorithm has ended.
+
+    Those that are there already are read again.
+    """
     title, found = entries(plan)
     project = context.project()
     if project is None:
         return
+    known = _by_source(project)
     for place, entry in reversed(list(enumerate(found))):
+        if entry.source in known:
+            # Algorithms run beside the thread of the layers.
+            queued = Qt.ConnectionType.QueuedConnection
+            QMetaObject.invokeMethod(known[entry.source], "reload", queued)
+            continue
         details = QgsProcessingContext.LayerDetails(entry.name, project, entry.name)
         placing = Placing(Path(plan), title, place, entry.shown)
         _WAITING.append(placing)
@@ -148,7 +158,7 @@ def show(plan: str | Path, project: QgsProject | None = None) -> dict[str, QgsMa
     project = project or QgsProject.instance()
     title, found = entries(plan)
     shown: dict[str, QgsMapLayer] = {}
-    known = {layer.source(): layer for layer in project.mapLayers().values()}
+    known = _by_source(project)
     for place, entry in enumerate(found):
         layer = known.get(entry.source)
         if layer is None:
@@ -160,3 +170,7 @@ def show(plan: str | Path, project: QgsProject | None = None) -> dict[str, QgsMa
         _, _, name = entry.source.rpartition("layername=")
         shown["scene" if entry.is_raster else name] = layer
     return shown
+
+
+def _by_source(project: QgsProject) -> dict[str, QgsMapLayer]:
+    return {layer.source(): layer for layer in project.mapLayers().values()}

@@ -214,8 +214,13 @@ def loaded(algorithm, values):
     if not done:
         return {"error": feedback.textLog()}
     handleAlgorithmResults(found, context, feedback)
+    QgsApplication.processEvents()
     root = QgsProject.instance().layerTreeRoot()
     return {
+        "obstacles_m2": [
+            sum(row.geometry().area() for row in layer.getFeatures())
+            for layer in QgsProject.instance().mapLayersByName("Obstacles")
+        ],
         "groups": {
             group.name(): [
                 [node.name(), node.isVisible(), type(node.layer().renderer()).__name__]

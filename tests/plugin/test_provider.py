@@ -358,6 +358,25 @@ def test_layers_come_styled_in_their_group(qgis, sample_plan, tmp_path):
     assert answer["loose"] == []
 
 
+def test_a_plan_that_is_shown_already_is_read_again(qgis, plan, tmp_path):
+    """Layers stayed as they were before the run, or came once more."""
+    own = shutil.copytree(plan, tmp_path / "own") / "field.gpkg"
+    first, again = qgis(
+        "several",
+        requests=[
+            {"do": "loaded", "algorithm": "geofield:obstacles", "values": {
+                "IMAGERY": str(SAMPLE), "PLAN": f"{own}|layername=field",
+                "BUFFER_M": margin_m, "OUTPUT": str(own)}}
+            for margin_m in (1, 4)
+        ],
+    )  # fmt: skip
+    assert "error" not in again, again
+    assert again["groups"] == first["groups"]
+    assert again["loose"] == []
+    (before,), (after,) = first["obstacles_m2"], again["obstacles_m2"]
+    assert after > 1.5 * before > 0
+
+
 def test_products_in_a_temporary_place_are_shown(qgis, sample_plan):
     """What a dialogue offers where no place is named."""
     values = {"FILES": [str(sample_plan)], "OUTPUT": "TEMPORARY_OUTPUT"}
