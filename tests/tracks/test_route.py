@@ -306,6 +306,21 @@ def test_a_way_out_of_a_ring_of_trees_is_none_and_one_within_is_found() -> None:
     assert taut <= length < taut * 1.01
 
 
+@pytest.mark.parametrize("strip_m", [0.1, 0.3, 0.6])
+def test_a_narrow_strip_beside_a_circle_is_passed(strip_m: float) -> None:
+    """The corners of sixteen sides around the circle lay beyond the border: there was no way."""
+    circle = np.array([[50.0, 30.0, 30.0 - strip_m]])
+    shapes = ObstacleShapes(circle, np.arange(1), np.empty(0, dtype=object), np.empty(0, int))
+    passage = Passage(shapely.box(0, 0, 100, 60), shapes)
+    way = passage.shortest(np.array([5.0, 30.0]), np.array([95.0, 30.0]))
+    assert way is not None
+    assert passage.fits(np.array([shapely.LineString(way)])).all()
+    radius = 30.0 - strip_m
+    free = np.sqrt(45.0**2 - radius**2)
+    taut = 2.0 * free + radius * (np.pi - 2.0 * np.arccos(radius / 45.0))
+    assert taut <= shapely.LineString(way).length < 1.01 * taut
+
+
 def test_vertices_along_a_straight_border_are_no_corners_to_turn_at() -> None:
     ring = shapely.get_coordinates(shapely.segmentize(shapely.box(0, 0, 600, 400), 1.0))[:-1]
     ring += np.random.default_rng(1).normal(0.0, 1e-4, ring.shape)

@@ -110,12 +110,15 @@ class Passage:
         each = np.array(
             [*round_ones, *shapely.buffer(solid, -TOUCH_M, join_style="mitre")], dtype=object
         )
+        wide = np.add(shapes.circles, (0, 0, _AROUND_M))
+        few = polygons_around(wide, _QUARTER_CORNERS)
+        # The corners of few sides would close what is left beside or between circles.
+        others = [*each, *shapely.get_parts(shapely.boundary(self.open_shell))]
+        tight = _meets(few, others) > _meets(round_ones, others)
+        many = polygons_around(wide[tight], QUARTER_SEGMENTS)
+        few[tight] = many
         around = np.array(
-            [
-                *polygons_around(np.add(shapes.circles, (0, 0, _AROUND_M)), _QUARTER_CORNERS),
-                *shapely.buffer(solid, _AROUND_M, join_style="mitre"),
-            ],
-            dtype=object,
+            [*few, *shapely.buffer(solid, _AROUND_M, join_style="mitre")], dtype=object
         )
         # Nothing passes between those that overlap: a row of trees is one shape to go around.
         self._blocks = shapely.get_parts(shapely.union_all(each))
@@ -238,6 +241,12 @@ class Passage:
         if _SHELL not in around and not shapely.covers(self.open_shell, lines).all():
             met.add(_SHELL)
         return sorted(met)
+
+
+def _meets(shapes: NDArray[np.object_], others: list[BaseGeometry]) -> NDArray[np.int64]:
+    """How many of others each shape meets."""
+    found = shapely.STRtree(others).query(shapes, predicate="intersects")[0]
+    return np.bincount(found, minlength=len(shapes))
 
 
 def _lines(begin: FloatArray, end: FloatArray) -> NDArray[np.object_]:
