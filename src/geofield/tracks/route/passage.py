@@ -111,14 +111,13 @@ class Passage:
             [*round_ones, *shapely.buffer(solid, -TOUCH_M, join_style="mitre")], dtype=object
         )
         wide = np.add(shapes.circles, (0, 0, _AROUND_M))
-        few = polygons_around(wide, _QUARTER_CORNERS)
+        rings = polygons_around(wide, _QUARTER_CORNERS)
         # The corners of few sides would close what is left beside or between circles.
         others = [*each, *shapely.get_parts(shapely.boundary(self.open_shell))]
-        tight = _meets(few, others) > _meets(round_ones, others)
-        many = polygons_around(wide[tight], QUARTER_SEGMENTS)
-        few[tight] = many
+        tight = _meets(rings, others) > _meets(round_ones, others)
+        rings[tight] = polygons_around(wide[tight], QUARTER_SEGMENTS)
         around = np.array(
-            [*few, *shapely.buffer(solid, _AROUND_M, join_style="mitre")], dtype=object
+            [*rings, *shapely.buffer(solid, _AROUND_M, join_style="mitre")], dtype=object
         )
         # Nothing passes between those that overlap: a row of trees is one shape to go around.
         self._blocks = shapely.get_parts(shapely.union_all(each))
