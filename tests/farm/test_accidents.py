@@ -99,3 +99,21 @@ def test_a_poisoned_picture_costs_its_own_places_alone(sample: Path, tmp_path: P
     assert status["status"] == "failed"
     assert "field_2.tif" in status["error"]
     assert list(pd.read_csv(tmp_path / "farm" / "failed.csv")["field_id"]) == ["field_2"]
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads are counted on Linux")
+def test_reading_a_farm_leaves_no_thread_that_could_abort_the_process(tmp_path: Path) -> None:
+    outlines = Path(__file__).parents[2] / "sample_data" / "field_1.gpkg"
+    line = ["--spacing", "8", "--workers", "1", "--no-overview", "--out"]
+    subprocess.run([GEOFIELD, "batch", outlines, *line, tmp_path], check=True, capture_output=True)
+    asked = (
+        "import os, sys\n"
+        "from geofield.farm.folder import read_parts\n"
+        "from geofield.farm.store import Store\n"
+        "before = len(os.listdir('/proc/self/task'))\n"
+        "parts = len(list(read_parts(Store.of(sys.argv[1]), 'field')))\n"
+        "print(parts, len(os.listdir('/proc/self/task')) - before)\n"
+    )
+    asking = [sys.executable, "-c", asked, str(tmp_path)]
+    done = subprocess.run(asking, capture_output=True, text=True, check=False)
+    assert done.stdout.split() == ["1", "0"], done.stderr

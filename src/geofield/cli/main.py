@@ -5,7 +5,6 @@ Subcommands are imported only when they run, so that ``--help`` is quick.
 
 from __future__ import annotations
 
-import atexit
 import errno
 import gc
 import importlib
@@ -187,31 +186,6 @@ def main(args: list[str] | None = None) -> None:
         The words behind ``geofield``, from a program that goes on afterwards; without them those
         that this process was started with, which ends.
     """
-    try:
-        _run(args)
-    except SystemExit as stop:
-        if args is None and isinstance(stop.code, int):
-            _leave(stop.code)
-        raise
-
-
-def _leave(code: int) -> None:
-    """End the process when all is done, without taking libraries apart.
-
-    A thread of one that still runs then makes its C++ abort the process: of 53 farms that were
-    planned on a busy machine one was written, told, and ended with 134.
-    """
-    try:
-        atexit._run_exitfuncs()
-        for stream in (sys.stdout, sys.stderr):
-            stream.flush()
-    except (OSError, ValueError):
-        return  # Python says what it could not write
-    os._exit(code)
-
-
-def _run(args: list[str] | None) -> None:
-    """Run the command line; always leaves by an exception."""
     # What libraries make while they load stays to the end: going through it is 7 % of a start.
     gc.set_threshold(10_000)
     _open_streams(own=args is None)

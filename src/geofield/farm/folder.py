@@ -163,7 +163,10 @@ def read_part(
     if data is None:
         return None
     try:
-        table = pq.read_table(pa.BufferReader(data), columns=columns)
+        # By this thread alone: one of Arrow's that lets go of the bytes while Python ends makes C++
+        # abort the process.
+        file = pq.ParquetFile(pa.BufferReader(data))
+        table = file.read(columns, use_threads=False)
     except (pa.ArrowInvalid, OSError) as error:
         raise FormatError(
             f"{store.shown}/{file_of(layer, chunk)} is damaged: {error}.",
