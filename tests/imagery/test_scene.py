@@ -512,14 +512,16 @@ def test_points_outside_or_on_no_data(tmp_path: Path) -> None:
 
 def test_no_crs_no_position(tmp_path: Path) -> None:
     path = write(tmp_path / "x.tif", ground(), crs=None)
-    with pytest.raises(CRSError, match="does not name its coordinate reference system"):
-        read_scene(path)
+    with pytest.raises(CRSError, match="does not name its coordinate reference system") as told:
+        read_scene(path, lat=-33.5, lon=150.0)
+    assert "EPSG:32756 (UTM zone 56S)" in str(told.value.hint)  # the zone of the place
     assert read_scene(path, crs=UTM).grid.crs.to_epsg() == 32636
     from PIL import Image
 
     Image.fromarray(np.moveaxis(ground(), 0, -1)).save(tmp_path / "photo.png")
-    with pytest.raises(CRSError, match="no position on the ground"):
-        read_scene(tmp_path / "photo.png", crs=UTM)
+    for named in (None, UTM):  # a CRS would not help
+        with pytest.raises(CRSError, match="no position on the ground"):
+            read_scene(tmp_path / "photo.png", crs=named)
 
 
 def test_unreadable_truncated_empty(tmp_path: Path, rgb: str) -> None:

@@ -12,6 +12,7 @@ from pyproj import CRS
 from rasterio.enums import ColorInterp
 from rasterio.windows import Window
 
+from geofield.crs import authority_name, utm_crs
 from geofield.errors import CRSError
 from geofield.imagery.bands import OPAQUE, BandRoles, Look, find_roles, kept_roles, look_of
 from geofield.imagery.gdal import display_name, gdal_env, open_picture, to_pyproj
@@ -19,6 +20,8 @@ from geofield.imagery.tags import notes_from_tags, roles_from_tags, source_from_
 from geofield.model.scene import ImagerySource
 
 _SAMPLE_PX = 128
+#: A place whose zone is named where none is known, degrees.
+_EXAMPLE = (15.0, 45.0)
 
 
 def palette_of(dataset: Any) -> tuple[tuple[int, int, int, int], ...]:
@@ -99,13 +102,21 @@ def opaque(alpha: NDArray[Any], top: float) -> NDArray[np.bool_]:
     return np.asarray(alpha.astype(np.float64) * 2 > top)
 
 
-def crs_of(dataset: Any, path: str) -> CRS:
-    """The CRS of the file or of its ground control points."""
+def crs_of(dataset: Any, path: str, point: tuple[float, float] | None = None) -> CRS:
+    """The CRS of the file or of its ground control points; a hint names the zone of `point`.
+
+    Raises
+    ------
+    CRSError
+        The file names none.
+    """
     gcps, gcp_crs = dataset.gcps
     found = dataset.crs or (gcp_crs if gcps else None)
     if not found:
+        zone = utm_crs(*(point or _EXAMPLE))
+        named = f"{authority_name(zone)} ({zone.name.rpartition(' / ')[2]})"
         raise CRSError(
             f"The picture {display_name(path)} does not name its coordinate reference system.",
-            hint="Name it, for instance --crs EPSG:32633 (UTM zone 33 north); in Python crs=...",
+            hint=f"Name it, for instance --crs {named}; in Python crs=...",
         )
     return to_pyproj(found)

@@ -74,6 +74,20 @@ class Place:
     guesses: tuple[str, ...] = ()
 
 
+def refuse_unplaced(dataset: Any) -> None:
+    """Refuse a file that does not say where its pixels lie, whatever CRS it or a person names.
+
+    Raises
+    ------
+    CRSError
+    """
+    if dataset.transform.is_identity and len(dataset.gcps[0]) < 3:
+        raise CRSError(
+            f"The picture {display_name(dataset.name)} has no position on the ground.",
+            hint="Georeference it (QGIS: Layer > Georeferencer), or put its world file beside.",
+        )
+
+
 def find_place(dataset: Any, crs: CRS, *, point: LonLat | None = None) -> Place:
     """The grid on which an open raster dataset is read; `crs` is its own or what the user says.
 
@@ -82,7 +96,7 @@ def find_place(dataset: Any, crs: CRS, *, point: LonLat | None = None) -> Place:
     Raises
     ------
     CRSError
-        No position, or a CRS that is not one of maps.
+        A CRS that is not one of maps.
     PointOutsideError
         A picture to be reprojected does not hold the point.
     """
@@ -95,11 +109,6 @@ def find_place(dataset: Any, crs: CRS, *, point: LonLat | None = None) -> Place:
             "(UTM zone 33 north).",
         )
     if transform.is_identity:
-        if len(gcps) < 3:
-            raise CRSError(
-                f"The picture {display_name(dataset.name)} has no position on the ground.",
-                hint="Georeference it (QGIS: Layer > Georeferencer), or put its world file beside.",
-            )
         rough = Grid(dataset.width, dataset.height, from_gcps(gcps), crs)
         target = metric_crs(*rough.centre_lonlat)
         # GDAL fits the control points only on a grid of its own choice.

@@ -29,7 +29,7 @@ from geofield.imagery.facts import crs_of, opaque, palette_of, roles_of, top_of
 from geofield.imagery.fill import undeclared_fill
 from geofield.imagery.gdal import display_name, gdal_env, open_picture, reading, to_rasterio
 from geofield.imagery.opening import OpenOptions
-from geofield.imagery.placing import WarpOrigin, find_place
+from geofield.imagery.placing import WarpOrigin, find_place, refuse_unplaced
 from geofield.imagery.reach import OWN_FOLDER, Reach
 from geofield.imagery.scaling import scaled_bands
 from geofield.imagery.tags import is_ours, notes_from_tags, scaling_from_tags, source_from_tags
@@ -132,8 +132,10 @@ class SceneReader:
                 fill = None
                 if not palette and not has_mask:
                     fill = undeclared_fill(dataset, roles.shown, alpha=roles.alpha, top=top)
+            refuse_unplaced(dataset)
             # A file of ours says its own, which may be another than that of what it was made from.
-            own_crs = crs_of(dataset, path) if crs is None or is_ours(tags) else parse_crs(crs)
+            own = crs is None or is_ours(tags)
+            own_crs = crs_of(dataset, path, options.point) if own else parse_crs(crs)
             dtype = str(np.result_type(*dtypes))
             place = find_place(dataset, own_crs, point=options.point)
             negative = dataset.tags(ns="IMAGE_STRUCTURE").get("MINISWHITE") == "YES"
