@@ -5,6 +5,7 @@ Subcommands are imported only when they run, so that ``--help`` is quick.
 
 from __future__ import annotations
 
+import atexit
 import errno
 import gc
 import importlib
@@ -186,6 +187,31 @@ def main(args: list[str] | None = None) -> None:
         The words behind ``geofield``, from a program that goes on afterwards; without them those
         that this process was started with, which ends.
     """
+    try:
+        _run(args)
+    except SystemExit as stop:
+        if args is None and isinstance(stop.code, int):
+            _leave(stop.code)
+        raise
+
+
+def _leave(code: int) -> None:
+    """End the process when all is done, without taking libraries apart.
+
+    One that is taken apart while a thread of its own still runs may abort the process: all would
+    be written and told, and the exit code of a fault given.
+    """
+    try:
+        atexit._run_exitfuncs()
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+    except (OSError, ValueError):
+        return  # Python says what it could not write
+    os._exit(code)
+
+
+def _run(args: list[str] | None) -> None:
+    """Run the command line; always leaves by an exception."""
     # What libraries make while they load stays to the end: going through it is 7 % of a start.
     gc.set_threshold(10_000)
     _open_streams(own=args is None)
