@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from html import escape
+from pathlib import Path
 from typing import Any
 
 from qgis.core import QgsCoordinateTransform, QgsPointXY, QgsProject, QgsVectorLayer
@@ -85,8 +86,8 @@ class ReviewDock(QDockWidget):
             button = QPushButton(f"{text}  ({written(key)})" if key else text)
             button.clicked.connect(action)
             self.buttons[name] = button
-            wide = 2 if name in ("open", "save") else 1
-            grid.addWidget(button, (number + 1) // 2, (number + 1) % 2, 1, wide)
+            column, wide = (0, 2) if name in ("open", "save") else ((number + 1) % 2, 1)
+            grid.addWidget(button, (number + 1) // 2, column, 1, wide)
         actions = {key: action for *_, key, action in rows if key}
         actions[UNDO] = self.undo
         self._keys = Keys(self, self.canvas, actions, self._is_ours)
@@ -132,12 +133,17 @@ class ReviewDock(QDockWidget):
         if self._released is not None and not path:
             return False  # the plan that is here is being written
         active = path_of(self.iface.activeLayer()) if self.iface.activeLayer() else ""
-        others = [path_of(layer) for layer in QgsProject.instance().mapLayers().values()]
-        for candidate in (path or "", active, *others):
-            layers = plan_files.layers_of(candidate) if candidate else {}
-            if {"obstacles", "field"} <= set(layers):
-                self._take(candidate, layers["obstacles"])
-                return True
+        others = map(path_of, QgsProject.instance().layerTreeRoot().layerOrder())
+        for candidate in dict.fromkeys((path, active, *others)):
+            obstacles = plan_files.obstacles_of(candidate) if candidate else None
+            if obstacles is None:
+                continue
+            if not Path(candidate).is_file():
+                gone = tr("{0} is not there: put it back, or choose a layer of another plan.")
+                self._trouble(gone.format(candidate))
+                return False
+            self._take(candidate, obstacles)
+            return True
         self._trouble(tr("There is no plan in this project: plan a field first."))
         return False
 

@@ -17,14 +17,17 @@ from qgis.core import (
 )
 from qgis.PyQt.QtXml import QDomDocument, QDomElement
 
+from . import results, sources
 from .algorithm import path_of
-from .results import settled
 from .sources import table_of
+
+#: What a review is of.
+_REVIEWED = ("obstacles", "field")
 
 
 def all_of(path: str) -> list[QgsVectorLayer]:
     """All layers of the project that show a plan's GeoPackage, duplicated ones too."""
-    path = str(settled(path))
+    path = str(results.settled(path))
     layers = QgsProject.instance().mapLayers().values()
     return [each for each in layers if isinstance(each, QgsVectorLayer) and path_of(each) == path]
 
@@ -32,6 +35,22 @@ def all_of(path: str) -> list[QgsVectorLayer]:
 def layers_of(path: str) -> dict[str, QgsVectorLayer]:
     """The project's layers of a plan's GeoPackage, by their names in it."""
     return {table_of(layer): layer for layer in all_of(path)}
+
+
+def obstacles_of(path: str) -> QgsVectorLayer | None:
+    """The obstacles of a plan that has a layer in the project; None where it has none.
+
+    Obstacles and outline that were taken out of the project are put back into it, and layers
+    whose file was not there for a while are opened again.
+    """
+    for each in all_of(path):
+        if not each.isEditable() and not each.supportsEditing():
+            _point_to(each, each.source(), "ogr")
+    layers = layers_of(path)
+    missing = [name for name in _REVIEWED if name not in layers]
+    if not layers or (missing and not sources.is_plan(path)):
+        return None
+    return {**layers, **{name: results.load(path, name) for name in missing}}["obstacles"]
 
 
 def as_edited(path: str, obstacles: QgsVectorLayer) -> dict[str, Any]:

@@ -93,8 +93,15 @@ class Placing(QgsProcessingLayerPostProcessorInterface):
 def group_of(project: QgsProject, plan: Path, title: str) -> QgsLayerTreeGroup:
     """The group of a plan, made where there is none; another plan of the same field has its own."""
     root, path = project.layerTreeRoot(), str(settled(plan))
-    for group in root.findGroups(True):
+    groups = root.findGroups(True)
+    for group in groups:
         if group.customProperty(_PLAN) == path:
+            return group
+    for group in groups:  # a project that was moved with its plans knows them by their layers
+        layers = [node.layer() for node in group.findLayers() if node.parent() == group]
+        files = [Path(layer.source().split("|", 1)[0]) for layer in layers if layer is not None]
+        if group.customProperty(_PLAN) and any(str(settled(file)) == path for file in files):
+            group.setCustomProperty(_PLAN, path)
             return group
     taken = root.findGroup(title) is not None
     group = root.insertGroup(0, f"{title} ({plan.parent.name}/{plan.stem})" if taken else title)
@@ -170,6 +177,20 @@ def show(plan: str | Path, project: QgsProject | None = None) -> dict[str, QgsMa
         _, _, name = entry.source.rpartition("layername=")
         shown["scene" if entry.is_raster else name] = layer
     return shown
+
+
+def load(plan: str | Path, table: str) -> QgsVectorLayer:
+    """Load one layer of a plan, at its place."""
+    title, found = entries(plan)
+    source = f"{settled(plan)}|layername={table}"
+    listed = {each.source: place for place, each in enumerate(found)}
+    place = listed.get(source, 0)
+    name = found[place].name if source in listed else table
+    layer = QgsVectorLayer(source, name, "ogr")
+    project = QgsProject.instance()
+    project.addMapLayer(layer, False)
+    place_layer(layer, group_of(project, Path(plan), title), place, True)
+    return layer
 
 
 def _by_source(project: QgsProject) -> dict[str, QgsMapLayer]:

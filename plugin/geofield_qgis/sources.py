@@ -76,9 +76,13 @@ def plan_file(layer: QgsMapLayer | None) -> str | None:
     path = str(QgsProviderRegistry.instance().decodeUri("ogr", layer.source()).get("path") or "")
     if not path.lower().endswith(".gpkg") or table_of(layer) != "field":
         return None
+    return path if is_plan(path) and layer.fields().indexOf("field_id") >= 0 else None
+
+
+def is_plan(path: str) -> bool:
+    """Whether a file has an outline and obstacles."""
     details = QgsProviderRegistry.instance().querySublayers(path)
-    own = {"field", "obstacles"} <= {each.name() for each in details}
-    return path if own and layer.fields().indexOf("field_id") >= 0 else None
+    return {"field", "obstacles"} <= {each.name() for each in details}
 
 
 def table_of(layer: QgsVectorLayer) -> str:

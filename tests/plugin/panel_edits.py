@@ -1,5 +1,7 @@
 """Edits around the panel that its keys do not make; run by Debian's Python as `panel` is."""
 
+from pathlib import Path
+
 import panel
 from client import answer
 from osgeo import ogr
@@ -229,9 +231,92 @@ def held(plan):
     return {"rejected": len(rejected), "stepped": dock.current != first}
 
 
+def taken_out(plan, gone):
+    """A plan of which a person took layers out of the project before the review."""
+    layers, dock = reviewed(plan)
+    project = QgsProject.instance()
+    for name in gone:
+        project.removeMapLayer(layers[name].id())
+    before = set(project.mapLayers())
+    found = dock.open()
+    if not found:
+        return {"found": found, "said": panel.window.said()}
+    settled(dock)
+    dock.decide("rejected")
+    settled(dock)
+    dock.save()
+    written(dock)
+    back = {layer.name() for each, layer in project.mapLayers().items() if each not in before}
+    groups = project.layerTreeRoot().findGroups()
+    return {
+        "found": found, "said": panel.window.said(), "title": dock.labels.title.text(),
+        "count": dock.labels.count.text(), "figures": dock.labels.figures.text(),
+        "back": sorted(back), "groups": len(groups),
+        "order": [each.name() for each in groups[0].findLayers()],
+    }  # fmt: skip
+
+
+def away(plan, home):
+    """A plan whose file is not there for a while: in the session, and when a project is opened."""
+    _, dock = reviewed(plan)
+    dock.open()
+    settled(dock)
+    project, seen = QgsProject.instance(), []
+    for reopened in (False, True):
+        if reopened:
+            project.write(f"{home}/all.qgz")
+            project.clear()
+        Path(plan).rename(f"{plan}.away")
+        if reopened:
+            project.read(f"{home}/all.qgz")
+        panel.window.bar.clearWidgets()
+        QgsApplication.processEvents()
+        QgsApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+        gone = dock.open(), panel.window.said()[-1:]
+        Path(f"{plan}.away").rename(plan)
+        back = dock.open()
+        settled(dock)
+        dock.decide("rejected")
+        settled(dock)
+        dock.save()
+        written(dock)
+        seen.append([*gone, back, dock.labels.count.text()])
+    return seen
+
+
+def moved(plan, home):
+    """A project that was moved with its plan, from which the outline was taken out."""
+    reviewed(plan)
+    project, other = QgsProject.instance(), Path(home) / "moved"
+    here = Path(plan).parent
+    project.write(str(here / "all.qgz"))
+    project.clear()
+    here.rename(other)
+    project.read(str(other / "all.qgz"))
+    (field,) = project.mapLayersByName("Field")
+    project.removeMapLayer(field.id())
+    from geofield_qgis.dock import ReviewDock
+
+    dock = ReviewDock(panel.window)
+    found = dock.open()
+    settled(dock)
+    groups = project.layerTreeRoot().findGroups(True)
+    return [found, [[each.name() for each in group.findLayers()] for group in groups]]
+
+
+def laid_out(plan):
+    """Left and right ends of the buttons that are as wide as the panel."""
+    _, dock = opened(plan)
+    dock.resize(420, 700)
+    QgsApplication.processEvents()
+    boxes = [dock.buttons[name].geometry() for name in ("open", "save")]
+    return [[box.left(), box.right()] for box in boxes]
+
+
 _ALL = (
     outline, outline_cut, while_written, deleted_and_drawn, made_read_only, project_with_sketch,
-    farm, numbered_anew, held, taken_over, removed,
+    farm, numbered_anew, held, taken_over, removed, taken_out, away, moved,
+    laid_out,
 )  # fmt: skip
 
 if __name__ == "__main__":

@@ -97,3 +97,45 @@ def test_several_fields_are_told_once_with_what_to_do(panel, geofield, tmp_path)
     told = geofield("farm", "put", tmp_path / "farm" / "farm.gpkg", tmp_path / "farm")
     assert "a of" in f"{told}"
     assert "is now as you left it" in f"{told}"
+
+
+@pytest.mark.parametrize(
+    ("gone", "back"),
+    [
+        (["field"], ["Field"]),
+        (["obstacles", "tracks"], ["Obstacles"]),
+        (["field", "obstacles"], ["Field", "Obstacles"]),
+    ],
+)
+def test_a_plan_is_found_by_any_of_its_layers(panel, plan, gone, back):
+    whole = panel("taken_out", plan=plan, gone=[])
+    seen = panel("taken_out", plan=plan, gone=gone)
+    assert seen["found"]
+    assert seen["said"] == []
+    assert seen["back"] == back
+    assert seen["title"] == whole["title"]
+    assert "2 rejected" in seen["count"]
+    assert seen["groups"] == 1
+    assert set(whole["order"]) - set(seen["order"]) == ({"Tracks"} if "tracks" in gone else set())
+
+
+def test_a_plan_whose_file_is_away_is_told_and_opened_when_it_is_back(panel, plan, tmp_path):
+    first, reopened = panel("away", plan=plan, home=str(tmp_path))
+    for found, said, back, _ in (first, reopened):
+        assert not found
+        assert f"{plan} is not there" in said[0]
+        assert back
+    assert "1 rejected" in first[-1]
+    assert "2 rejected" in reopened[-1]
+
+
+def test_a_layer_of_a_moved_plan_goes_into_its_group(panel, plan, tmp_path):
+    found, groups = panel("moved", plan=plan, home=str(tmp_path))
+    assert found
+    (group,) = groups
+    assert "Field" in group
+
+
+def test_the_wide_buttons_are_as_wide_as_the_panel(panel, plan):
+    opens, saves = panel("laid_out", plan=plan)
+    assert opens == saves

@@ -240,6 +240,11 @@
     </message>
     <message>
       <location filename="dock.py" />
+      <source>{0} is not there: put it back, or choose a layer of another plan.</source>
+      <translation>{0} ist nicht da: Legen Sie die Datei zurück, oder wählen Sie einen Layer eines anderen Plans.</translation>
+    </message>
+    <message>
+      <location filename="dock.py" />
       <source>The obstacles are read-only here: nothing can be decided.</source>
       <translation>Die Hindernisse sind hier schreibgeschützt: nichts lässt sich entscheiden.</translation>
     </message>
