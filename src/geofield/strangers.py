@@ -85,7 +85,7 @@ class _RootSeenError(Exception):
 
 
 def check_vector(path: Path | str) -> None:
-    """Refuse a vector file that is empty or only points elsewhere, and a picture.
+    """Refuse a vector file that is empty, a half or only points elsewhere, and a picture.
 
     XML that defines entities is refused, too.
 
@@ -104,6 +104,12 @@ def check_vector(path: Path | str) -> None:
         raise FormatError(f"{file} cannot be read: {error.strerror}.") from None
     if not head:
         raise FormatError(f"{file} is empty (0 bytes).", hint="Copy it again.")
+    if file.suffix.lower() == ".shp" and not any(
+        file.with_suffix(suffix).exists() for suffix in (".shx", ".SHX")
+    ):
+        raise FormatError(
+            f"{file.name} lacks its .shx index.", hint="Copy all files of the Shapefile."
+        )
     if head.startswith(PICTURES):
         raise FormatError(
             f"{file} is a picture; what is wanted here are shapes (polygons, points, lines).",

@@ -117,6 +117,16 @@ def some_of(names: Sequence[str], most: int) -> str:
     return f"{', '.join(names[:most])}{more}"
 
 
+def without_shape(rows: Sequence[int], what: str) -> str:
+    """What becomes of rows of a file that have no shape, by their numbers from 1.
+
+    >>> without_shape([2, 4], "left out")
+    '2 rows have no shape and are left out: row 2, 4.'
+    """
+    words = counted(len(rows), "row has no shape and is", "rows have no shape and are")
+    return f"{words} {what}: row {some_of([str(row) for row in rows], 5)}."
+
+
 def names_from(source: Callable[[], Mapping[str, str]]) -> None:
     """Tell who knows what more options are called; that is asked when a message names an option."""
     _SOURCES.append(source)

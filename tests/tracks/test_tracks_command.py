@@ -728,3 +728,39 @@ def test_a_machine_whose_side_is_in_a_tree_is_told(
     assert list(notes) == [str(each.message) for each in found]
     assert len(notes) == (0 if told is None else 1)
     assert told is None or told in notes[0]
+
+
+@pytest.mark.parametrize("suffix", ["geojson", "gpkg"])
+def test_rows_without_a_shape_are_left_out_as_by_import(suffix: str, tmp_path: Path) -> None:
+    file, plan = tmp_path / f"parcels.{suffix}", tmp_path / "plan.gpkg"
+    frame = outlines(3).to_crs("OGC:CRS84")
+    frame.loc[1, "geometry"] = None
+    frame.to_file(file)
+    words = "1 row has no shape and is left out: row 2."
+    done = run_geofield("tracks", file, "--spacing", 20, "-o", plan, check=True)
+    assert f"parcels.{suffix}: {words}" in done.stderr
+    assert len(gpd.read_file(plan, layer="field")) == 2
+    # One that is left is a plan of its own; none is an error.
+    frame.iloc[:2].to_file(file)
+    done = run_geofield("import", file, "-o", tmp_path / "imported.gpkg", check=True)
+    assert words in done.stderr
+    run_geofield("tracks", file, "--spacing", 20, "-o", plan, "--overwrite", check=True)
+    assert read_plan(plan).tracks is not None
+    frame.iloc[1:2].to_file(file)
+    assert run_geofield("tracks", file, "--spacing", 20, "-o", tmp_path / "no.gpkg").returncode == 1
+
+
+@pytest.mark.parametrize("archive", [False, True])
+def test_a_shapefile_without_its_index_is_told_as_by_import(archive: bool, tmp_path: Path) -> None:
+    file = tmp_path / "parcels.shp"
+    outlines(2).to_file(file)
+    file.with_suffix(".shx").unlink()
+    if archive:
+        file = Path(shutil.make_archive(str(tmp_path.with_suffix("")), "zip", tmp_path))
+    target = ("-o", tmp_path / "plan.gpkg")
+    said = [
+        run_geofield(*words, *target).stderr
+        for words in (("import", file), ("tracks", file, "--spacing", 20))
+    ]
+    assert said[0] == said[1]
+    assert "parcels.shp lacks its .shx index.\nCopy all files of the Shapefile." in said[0]

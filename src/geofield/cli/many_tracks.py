@@ -14,7 +14,7 @@ from geofield.cli.field_notes import labels, notes_in, remarks, tell_farm, tell_
 from geofield.cli.parcels import tell_places
 from geofield.cli.standing import tell_unreached
 from geofield.errors import GeofieldError, TrackError
-from geofield.wording import counted, unlike
+from geofield.wording import counted, unlike, without_shape
 
 if TYPE_CHECKING:
     from geofield.farm.engine import Engine
@@ -55,11 +55,17 @@ def parcels_in(file: Path, settings: Settings, crs: str | None) -> Places:
     TrackError
         When it holds no polygons.
     """
+    import numpy as np
+
     from geofield.farm.place_reader import read_places
 
     places = read_places(file, settings=settings, crs=crs, unnamed=file.stem)
     if places.outlines is None:
         raise TrackError(f"{file} holds no polygons.", hint="Give a file of field outlines.")
+    known = np.isfinite(places.lat) & np.isfinite(places.lon)
+    if not known.all():
+        say_note(f"{file.name}: {without_shape(places.rows[~known].tolist(), 'left out')}")
+        places = places.only(np.flatnonzero(known))
     return tell_places(places)
 
 

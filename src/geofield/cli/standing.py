@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from geofield.cli.console import say, say_note
-from geofield.wording import counted, none_of
+from geofield.wording import counted, none_of, without_shape
 
 if TYPE_CHECKING:
     from geofield.farm.places import Places
@@ -51,14 +51,9 @@ def tell_obstacles(job: Job, *, several: bool) -> None:
         say_note(f"{job.obstacles.name}: what all its layers hold is avoided: {', '.join(layers)}.")
     for note in datum_notes(CRS(standing.crs), *shapely.get_coordinates(standing.geometry).T):
         say_note(f"{job.obstacles.name}: {note}")
-    lost = standing.attrs[WITHOUT_SHAPE]
-    if lost:
-        rows = ", ".join(map(str, lost[:5])) + (", ..." if len(lost) > 5 else "")
-        say_note(
-            f"{job.obstacles.name}: {counted(len(lost), 'row has', 'rows have')} no shape and "
-            f"{'is' if len(lost) == 1 else 'are'} not avoided: row "
-            f"{rows}. Draw or delete them."
-        )
+    if lost := standing.attrs[WITHOUT_SHAPE]:
+        words = without_shape(lost, "not avoided")
+        say_note(f"{job.obstacles.name}: {words} Draw or delete them.")
     unsized = unsized_points(standing) if several else 0
     if unsized:
         say_note(

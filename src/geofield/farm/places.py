@@ -7,7 +7,7 @@ becomes a :class:`Place` when it is its turn.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import geopandas as gpd
@@ -83,6 +83,25 @@ class Places:
             return False
         known = np.isfinite(self.lat) & np.isfinite(self.lon)
         return not (known & self.outlines.is_null().to_numpy(zero_copy_only=False)).any()
+
+    def only(self, positions: NDArray[np.int64]) -> Places:
+        """Some of the places, as if the others were not in the file."""
+        return replace(
+            self,
+            ids=self.ids.take(positions),
+            names=self.names.take(positions),
+            lat=self.lat[positions],
+            lon=self.lon[positions],
+            rows=self.rows[positions],
+            outlines=None if self.outlines is None else self.outlines.take(positions),
+            own=self.own.take(positions),
+            settings=self.settings.take(positions),
+            remarks={
+                now: self.remarks[before]
+                for now, before in enumerate(positions.tolist())
+                if before in self.remarks
+            },
+        )
 
     def take(self, positions: Sequence[int] | NDArray[np.int64]) -> Iterator[Place]:
         """Some of the places."""

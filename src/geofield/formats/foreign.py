@@ -28,7 +28,7 @@ from geofield.formats.sorting import RawLayer, sort_out
 from geofield.model import Dataset
 from geofield.notes import warn
 from geofield.strangers import check_vector, unreadable
-from geofield.wording import counted
+from geofield.wording import counted, without_shape
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -290,9 +290,8 @@ def read_foreign(
 def _read(frame: gpd.GeoDataFrame, where: str, crs: CRS | None) -> gpd.GeoDataFrame:
     """The rows with a shape, in a CRS, as one that were cut at the 180th meridian."""
     keep = ~(frame.geometry.isna() | frame.geometry.is_empty)
-    if lost := int((~keep).sum()):
-        words = counted(lost, "row has no shape and is", "rows have no shape and are")
-        warn(f"{where}: {words} left out.", FormatWarning, stacklevel=4)
+    if lost := (np.flatnonzero(~keep) + 1).tolist():
+        warn(f"{where}: {without_shape(lost, 'left out')}", FormatWarning, stacklevel=4)
     frame = _with_crs(frame[keep].reset_index(drop=True), where, crs)
     shapes = np.asarray(frame.geometry.to_numpy(), dtype=object)
     return frame.set_geometry(joined(shapes, CRS(frame.crs)), crs=frame.crs)

@@ -62,10 +62,6 @@ def read(path: Path, *, crs: CRS | None = None) -> Dataset:
 
 
 def _raw(file: Path) -> RawLayer:
-    if not any(file.with_suffix(suffix).exists() for suffix in (".shx", ".SHX")):
-        raise FormatError(
-            f"{file.name} lacks its .shx index.", hint="Copy all files of the Shapefile."
-        )
     frame = read_vector(file)
     layer = GENERIC.get(file.stem.lower())
     if layer is None:
