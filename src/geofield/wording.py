@@ -121,10 +121,11 @@ def without_shape(rows: Sequence[int], what: str) -> str:
     """What becomes of rows of a file that have no shape, by their numbers from 1.
 
     >>> without_shape([2, 4], "left out")
-    '2 rows have no shape and are left out: row 2, 4.'
+    '2 rows have no shape and are left out: rows 2, 4.'
     """
     words = counted(len(rows), "row has no shape and is", "rows have no shape and are")
-    return f"{words} {what}: row {some_of([str(row) for row in rows], 5)}."
+    which = "row" if len(rows) == 1 else "rows"
+    return f"{words} {what}: {which} {some_of([str(row) for row in rows], 5)}."
 
 
 def names_from(source: Callable[[], Mapping[str, str]]) -> None:
