@@ -1,5 +1,6 @@
 """Bad input: a clear message or a flagged result, never a silent wrong polygon."""
 
+import re
 import warnings
 from dataclasses import replace
 
@@ -153,3 +154,55 @@ def test_what_is_not_trusted_says_why(certainty):
     assert quality.reasons[0].startswith("where it ends is not certain (certainty 7")
     sure = replace(found, figures=(("certainty", 0.9),))
     assert judge(scene, look(scene), mask, outline, sure, seed, whole).reasons == ()
+
+
+def reasons_against(bands, left, top, right, bottom, certainty=0.95, seed=None):
+    """Whether an outline in a picture is trusted, and what is said against it."""
+    scene = scene_of(bands)
+    rows, columns = scene.grid.shape
+    mask = np.zeros((rows, columns), bool)
+    mask[top:bottom, left:right] = True
+    found = Segmentation(mask, (), (("certainty", certainty),))
+    seed = seed or ((left + right) / 2, (top + bottom) / 2)
+    whole, outline = (shapely.box(0, 0, columns, rows), shapely.box(left, top, right, bottom))
+    quality = judge(scene, look(scene), mask, outline, found, seed, whole)
+    return quality.trusted, "; ".join(quality.reasons)
+
+
+@pytest.mark.parametrize("size", [200, 390, 900])
+def test_a_narrow_field_is_told_with_its_width_in_metres(size):
+    """Whatever the picture was reduced by to look at it."""
+    bands = flat([110, 125, 70, 160], (size, size))
+    trusted, said = reasons_against(bands, 50, 20, 68, size - 20)
+    width = re.search(r"it is only (\d+) m wide \(a road, a strip", said)
+    assert width
+    assert float(width[1]) == pytest.approx(18 * 0.6, abs=2.5)
+    assert not trusted
+    assert reasons_against(bands, 50, 20, 80, size - 20) == (True, "")
+
+
+def test_rough_ground_is_told_and_costs_certainty():
+    for noise, words in ((20.0, "it is rough (shrubs, a wood, buildings?)"), (8.0, "")):
+        bands = flat([110, 125, 70, 160], noise=3.0)
+        bands[:3] += np.random.default_rng(4).normal(0, noise, bands.shape[1:])
+        assert reasons_against(bands, 40, 40, 160, 160) == (not words, words)
+
+
+def test_a_scrap_is_told_with_its_area_and_a_full_picture_as_one():
+    bands = flat([110, 125, 70, 160])
+    assert reasons_against(bands, 50, 50, 80, 80) == (False, "it has only 324 m2")
+    assert reasons_against(bands, 50, 50, 84, 84) == (True, "")
+    trusted, said = reasons_against(bands, 0, 0, 200, 200)
+    assert not trusted
+    assert "it fills the whole picture" in said
+    assert "wide" not in said
+    trusted, said = reasons_against(bands, 0, 0, 200, 185)
+    assert trusted
+    assert "fills" not in said
+
+
+def test_a_point_beside_the_outline_costs_trust_unless_a_person_chose_the_region():
+    bands, outline = flat([110, 125, 70, 160]), (40, 40, 160, 160)
+    for certainty, trusted in ((0.95, False), (1.0, True)):
+        told = reasons_against(bands, *outline, certainty=certainty, seed=(20.0, 20.0))
+        assert told == (trusted, "the point lies on something else (a tree, a road, a roof?)")
