@@ -225,3 +225,19 @@ def test_a_grid_that_has_no_one_scale_is_refused(code, place):
     x, y = Transformer.from_crs(4326, code, always_xy=True).transform(*place)
     with pytest.raises(CRSError, match=f"EPSG:{code} stretches .*\n?.*UTM"):
         plan_tracks(shapely.box(x, y, x + 300, y + 300), crs=code, spacing_m=6.0, direction=45.0)
+
+
+@pytest.mark.parametrize("clearance_m", [18.0, 50.0])
+def test_a_clearance_is_kept_around_corners_and_ends_too(clearance_m: float) -> None:
+    """Machines of 36 m keep half their width: chords cut corners by 2 cm, and by 6 cm at 50 m."""
+    middle = shapely.Point(500100, 5600100)
+    field = shapely.box(500000, 5600000, 500200, 5600200)
+    pole = shapely.box(500099, 5600098, 500101, 5600102)
+    fence = shapely.LineString([(500090, 5600095), middle.coords[0]])
+    for obstacle in (pole, fence):
+        tracks = plan_tracks(
+            field, [obstacle], crs="EPSG:32632", spacing_m=1, direction=31, clearance_m=clearance_m
+        )
+        assert len(tracks.gaps) > 30
+        near_m = tracks.segments.distance(obstacle).min() / tracks.ground_scale
+        assert near_m == pytest.approx(clearance_m, abs=0.0011)

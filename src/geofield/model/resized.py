@@ -17,6 +17,7 @@ from geofield.model.obstacles import (
     QUARTER_SEGMENTS,
     circle_polygons,
     floats,
+    grown_by,
     still_round,
 )
 from geofield.model.written import Record, fitted_circles, same_shapes, shapes_of_plain
@@ -83,7 +84,7 @@ def circles(x: ArrayLike, y: ArrayLike, radius_m: ArrayLike, crs: CRS) -> NDArra
 
 def grown(shape: shapely.Polygon, buffer_m: float, was_m: float, scale: float) -> shapely.Polygon:
     """A shape with another safety margin than it was drawn with."""
-    result = shapely.buffer(shape, (buffer_m - was_m) * scale, quad_segs=8)
+    result: shapely.Polygon = grown_by(np.array([shape]), (buffer_m - was_m) * scale)[0]
     if result.is_empty or shapely.get_num_geometries(result) > shapely.get_num_geometries(shape):
         raise ObstacleError(
             f"A safety margin of {buffer_m:g} m leaves nothing whole of an obstacle drawn with one "

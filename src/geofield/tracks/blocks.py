@@ -17,9 +17,9 @@ from geofield.crs import ground_scale, ground_scale_of
 from geofield.errors import FARTHEST_M, CRSMismatchError, TrackError, TrackWarning
 from geofield.finite import MEND_IT, finite
 from geofield.model.obstacles import (
-    QUARTER_SEGMENTS,
     ObstacleShapes,
     active,
+    grown_by,
     numbered,
     shapes_of,
     sizes_of,
@@ -152,7 +152,7 @@ def _with_thin(
             hint="Give a column radius_m, or a clearance (--clearance).",
         )
     places, source = shapely.get_coordinates(geometry[point], return_index=True)
-    strips = shapely.buffer(geometry[line], width[line], quad_segs=QUARTER_SEGMENTS)
+    strips = grown_by(geometry[line], width[line])
     return ObstacleShapes(
         np.concatenate((shapes.circles, np.column_stack((places, width[point][source])))),
         np.concatenate((shapes.circle_no, number[point][source])),
@@ -168,8 +168,7 @@ def _grown(shapes: ObstacleShapes, clearance_m: float, crs: CRS) -> ObstacleShap
     circles[:, 2] += clearance_m * ground_scale(crs, circles[:, 0], circles[:, 1])
     polygons = shapes.polygons
     if len(polygons):
-        grown = clearance_m * ground_scale_of(polygons, crs)
-        polygons = shapely.buffer(polygons, grown, quad_segs=QUARTER_SEGMENTS)
+        polygons = grown_by(polygons, clearance_m * ground_scale_of(polygons, crs))
     return ObstacleShapes(circles, shapes.circle_no, polygons, shapes.polygon_no)
 
 
