@@ -35,6 +35,7 @@ from geofield.plan_files import save_plan
 from geofield.review import Session
 from geofield.settings import DirectionName
 from geofield.tracks import plan_route, plan_tracks
+from geofield_command import run_geofield
 
 GEOFIELD = str(Path(sys.executable).with_name("geofield"))
 pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.xdist_group("review")]
@@ -260,6 +261,37 @@ def test_bad_edits_are_refused_in_place_and_the_old_tracks_stay(page: Page) -> N
     page.wait(lambda: "crosses itself" in page.text("message"))
     assert page.state()["field"]["rings"] == before["field"]["rings"]
     assert page.state()["tracks"] == before["tracks"]
+
+
+def test_an_outline_without_room_for_turns_is_refused_when_it_is_drawn(
+    driver: webdriver.Chrome, plan_path: Path
+) -> None:
+    """It was refused on saving only, after all that a person had edited on it."""
+    wide = ["--spacing", "4", "--route", "boustrophedon", "--turning-radius", "40"]
+    run_geofield("tracks", plan_path, "-o", plan_path, "--overwrite", *wide, check=True)
+    with served(plan_path) as (address, _):
+        page = Page(driver, address)
+        before = page.state()
+        x, y = shapely.Polygon(before["field"]["rings"][0]).centroid.coords[0]
+        page.run("document.querySelector('[data-tool=anew]').click()")
+        for corner in ((0, 0), (40, 0), (40, 30), (0, 30), (0, 0)):
+            page.click(x + corner[0], y + corner[1])
+        page.wait(lambda: "40 m is larger than the field (50 m across)" in page.text("message"))
+        assert "Draw the outline wider, or choose no route." in page.text("message")
+        now = page.state()
+        assert (now["field"], now["edited"]) == (before["field"], False)
+        page.press("j", "c")
+        page.wait(lambda: page.judged() == 1)
+        page.button("save")
+        page.wait(lambda: "Saved" in page.text("message"))
+        page.run("document.getElementsByName('route')[0].value = 'none'")
+        page.run("document.querySelector('#settings button').click()")
+        page.wait(lambda: page.state()["settings"]["route"] == "none")
+        page.run("document.querySelector('[data-tool=anew]').click()")
+        for corner in ((0, 0), (40, 0), (40, 30), (0, 30), (0, 0)):
+            page.click(x + corner[0], y + corner[1])
+        page.wait(lambda: len(page.state()["field"]["rings"][0]) == 4)
+        assert not page.complaints()
 
 
 def test_what_is_typed_is_saved_with_a_comma_and_beside_other_edits(

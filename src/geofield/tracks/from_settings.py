@@ -20,7 +20,7 @@ from geofield.model.track_edits import TrackEdits
 from geofield.model.tracks import Tracks
 from geofield.notes import warn
 from geofield.settings import TrackSettings
-from geofield.tracks.outline import NEAR_M, metric, near
+from geofield.tracks.outline import NEAR_M, metric, near, refuse_wide_turns
 from geofield.tracks.planner import plan_tracks
 
 #: Settings that are arguments of the same name.
@@ -73,6 +73,10 @@ def plan_with_settings(
         edits=edits,
         **{name: getattr(settings, name) for name in _OF_TRACKS},
     )
+    if settings.route != "none" and settings.turning_radius_m is not None:
+        # Where the route is planned later, too, nobody is told of it later.
+        bounds_m = np.array(polygon.bounds) / tracks.ground_scale
+        refuse_wide_turns(bounds_m, settings.turning_radius_m, settings.margin_m)
     told = _reaching_in(settings, obstacles)
     for note in told:
         warn(note, TrackWarning, stacklevel=2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -57,6 +59,19 @@ def refuse_no_length(*, none_too: bool = False, **lengths_m: Any) -> None:
     for name, value in lengths_m.items():
         if value < 0.0 or (value == 0.0 and not none_too):
             raise TrackError(f"{name} is {value!r}; it must be a number, {least}.")
+
+
+def refuse_wide_turns(bounds_m: Iterable[float], radius_m: float, margin_m: float) -> None:
+    """Refuse a turning radius that is larger than a field of these bounds, metres on the ground."""
+    refuse_no_length(turning_radius_m=radius_m)
+    left, bottom, right, top = bounds_m
+    size = math.hypot(right - left, top - bottom) + 2.0 * margin_m
+    if 2.0 * radius_m > size:
+        raise TrackError(
+            f"A turning radius of {radius_m:g} m is larger than the field ({size:.0f} m across): "
+            "no turn fits.",
+            hint="Give the radius in metres, or leave it out for a route without curves.",
+        )
 
 
 def clean_outline(polygon: Any) -> tuple[Polygon, tuple[str, ...]]:

@@ -4,6 +4,7 @@
 export const SAID = {
   en: [
     [/^Give the distance between two tracks in metres.*$/, "Give the distance between two tracks in metres, for instance 3."],
+    [/^Give the radius in metres, or leave it out for a route without curves\.$/, "Draw the outline wider, or choose no route."],
     [/^Choose a wider headland, or none.*$/, "Choose a wider headland, or 0 for none."],
     [/^Settings are not valid: spacing_m: .*?\(given: (.*?)(?:;.*?)?\).*$/, "The spacing is a number of metres above 0, not $1."],
     [/^Settings are not valid: headland_m: .*?\(given: (.*?)(?:;.*?)?\).*$/, "The headland is a number of metres, 0 for none, not $1."],
@@ -44,6 +45,8 @@ export const SAID = {
     [/^Correct it with Edit outline, or draw it anew\.$/, "Bessern Sie ihn mit „Umriss ändern“ oder zeichnen Sie ihn neu."],
     [/^There is no picture beside this plan.*$/, "Neben diesem Plan liegt kein Bild, auf dem der Umriss zu finden wäre."],
     [/^A spacing of (.*) m is larger than the field \((.*) m long\)\.$/, "Ein Abstand von $1 m ist größer als das Feld ($2 m lang)."],
+    [/^A turning radius of (.*) m is larger than the field \((.*) m across\): no turn fits\.$/, "Ein Wenderadius von $1 m ist größer als das Feld ($2 m von Ecke zu Ecke): keine Wendung passt."],
+    [/^Give the radius in metres, or leave it out for a route without curves\.$/, "Zeichnen Sie den Umriss weiter, oder wählen Sie keinen Fahrweg."],
     [/^Give the distance between two tracks in metres.*$/, "Gemeint ist der Abstand zweier Spuren in Metern, zum Beispiel 3."],
     [/^Settings are not valid: spacing_m: .*?\(given: (.*?)(?:;.*?)?\).*$/, "Der Abstand ist eine Zahl in Metern über 0, nicht $1."],
     [/^Settings are not valid: headland_m: .*?\(given: (.*?)(?:;.*?)?\).*$/, "Das Vorgewende ist eine Zahl in Metern, 0 für keines, nicht $1."],

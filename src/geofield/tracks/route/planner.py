@@ -25,7 +25,7 @@ from geofield.model.obstacles import ObstacleShapes
 from geofield.model.tracks import Tracks
 from geofield.notes import warn
 from geofield.tracks.frame import FloatArray
-from geofield.tracks.outline import place_near, refuse_no_length
+from geofield.tracks.outline import place_near, refuse_no_length, refuse_wide_turns
 from geofield.tracks.route.curves import to_unit
 from geofield.tracks.route.order import PATTERNS, Pattern, nearest_start
 from geofield.tracks.route.passage import Passage
@@ -98,7 +98,7 @@ def plan_route(
     place = None if start is None else np.array(place_near(outline, start, "start")) / scale
     outline, shapes = _on_the_ground(outline, shapes, scale)
     if turning_radius_m is not None:
-        _check_radius(turning_radius_m, outline.bounds, margin_m)
+        refuse_wide_turns(outline.bounds, turning_radius_m, margin_m)
     lines = np.asarray(tracks.segments.geometry.to_numpy(), dtype=object)
     ends, legs = _ends(lines) / scale, _legs(lines)
     track_no = tracks.segments["track_no"].to_numpy(dtype=np.int64)
@@ -163,17 +163,6 @@ def _check(pattern: str, curve: str, skip: int, margin_m: float) -> None:
     if skip < 0:
         raise TrackError(f"skip is {skip}; it must be 0 or more tracks.")
     refuse_no_length(none_too=True, margin_m=margin_m)
-
-
-def _check_radius(radius_m: float, bounds: tuple[float, ...], margin_m: float) -> None:
-    refuse_no_length(turning_radius_m=radius_m)
-    size = float(np.hypot(bounds[2] - bounds[0], bounds[3] - bounds[1])) + 2.0 * margin_m
-    if 2.0 * radius_m > size:
-        raise TrackError(
-            f"A turning radius of {radius_m:g} m is larger than the field ({size:.0f} m across): "
-            "no turn fits.",
-            hint="Give the radius in metres, or leave it out for a route without curves.",
-        )
 
 
 def _ends(lines: NDArray[np.object_]) -> FloatArray:
