@@ -370,6 +370,16 @@ def test_a_taken_name_is_told_before_the_work(
     assert "is there already" in capsys.readouterr().err
     assert geofield("field", "missing.tif", "--lat", 35, "--lon", 33, "-o", "field.shp") == 1
     assert "not a GeoPackage name" in capsys.readouterr().err
+    # It said FIELD.GPKG and wrote FIELD.gpkg, or ended in a traceback where that was the plan.
+    capitals = tmp_path / "FIELD.GPKG"
+    assert geofield("tracks", PLAN, "--spacing", 4, "-o", capitals) == 1
+    assert "not a GeoPackage name" in capsys.readouterr().err
+    # What the driver had to say was six thousand letters of SQL.
+    assert geofield("tracks", PLAN, "--spacing", 4, "-o", tmp_path / f"{'x' * 245}.gpkg") == 1
+    words = capsys.readouterr().err
+    assert "could not be written: unable to open database file." in words
+    assert "CREATE TABLE" not in words
+    assert list(tmp_path.iterdir()) == [taken]
 
 
 def test_simulated_trees_without_room_are_told(

@@ -16,11 +16,14 @@ if TYPE_CHECKING:
 
 
 def refuse_other_names(output: Path) -> None:
-    """Refuse to write a plan into what is no GeoPackage by its name."""
-    if output.suffix.lower() != ".gpkg":
+    """Refuse to write a plan into what is no GeoPackage by its name.
+
+    Its project and the files beside it know it by that name, letter by letter.
+    """
+    if output.suffix != ".gpkg":
         raise FormatError(
             f"{output} is not a GeoPackage name.",
-            hint="Stages write NAME.gpkg; use `geofield export` for other formats.",
+            hint="Stages write NAME.gpkg, in small letters; `geofield export` has other formats.",
         )
 
 

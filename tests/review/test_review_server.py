@@ -19,6 +19,7 @@ from rasterio.warp import Resampling, calculate_default_transform, reproject
 
 from geofield.errors import GeofieldError
 from geofield.imagery.display import TILE_PX, TiledPicture
+from geofield.plan import read_plan
 from geofield.review.desk import Desk
 from geofield.review.server import MOST_BYTES, ReviewServer
 from geofield.review.shelf import Shelf
@@ -263,6 +264,41 @@ def test_a_plan_that_was_deleted_or_broken_is_told_and_edits_stay(
     plan_path.write_bytes(whole)
     again = Desk(plan_path)
     assert again.brought_back == "2 edits of a session that ended without saving were brought back."
+
+
+def test_a_name_that_no_file_can_have_is_refused_in_words(visitor: Visitor) -> None:
+    """That of 300 letters was an error of the server, with the whole path."""
+    visitor.post("/api/take", {})
+    for name in ("x" * 300, "\u00fc" * 120, "x" * 245):
+        status, answer = visitor.post("/api/save", {"name": name})
+        assert (status, answer["message"]) == (422, "That name is too long for a file.")
+    name = "x" * 214
+    assert visitor.post("/api/save", {"name": name})[1]["saved_as"] == f"{name}.gpkg"
+
+
+def test_a_plan_in_capitals_is_saved_under_another_name(plan_path: Path) -> None:
+    """Its edits could not be saved, and why was told in the words of a database."""
+    named = plan_path.rename(plan_path.with_name("Field.GPKG"))
+    words = "is not named as a plan, NAME.gpkg: save under another name."
+    server = ReviewServer()
+    desk = server.load(lambda: Shelf(named)).desk
+    thread = threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True)
+    thread.start()
+    page = Visitor(server)
+    try:
+        assert desk.opening()["brought_back"] == f"Field.GPKG {words}"
+        page.post("/api/take", {})
+        page.post("/api/edit", {"do": "status", "no": 3, "status": "rejected"})
+        status, answer = page.post("/api/save", {})
+        assert (status, "is not a GeoPackage name." in answer["message"]) == (422, True)
+        assert page.post("/api/save", {"name": "mine"})[1]["saved_as"] == "mine.gpkg"
+    finally:
+        server.shutdown()
+        server.server_close()
+        thread.join()
+    saved = read_plan(plan_path.with_name("mine.gpkg")).obstacles
+    assert saved is not None
+    assert saved.set_index("obstacle_no").loc[3, "status"] == "rejected"
 
 
 def test_no_session_is_ended_from_the_page_whose_edits_lie_nowhere(

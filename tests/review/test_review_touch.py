@@ -6,11 +6,15 @@ import sqlite3
 import time
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from browser import Page, chromium, served
 from selenium import webdriver
+
+from geofield.plan import read_plan
+from geofield.plan_files import save_plan
 
 pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.xdist_group("review")]
 
@@ -137,6 +141,25 @@ def test_what_matters_is_seen_on_a_small_screen(page: Page) -> None:
     page.driver.refresh()
     page.wait(lambda: page.run("return document.body.dataset.ready"))
     assert page.run(first) == "outline-h"
+
+
+def test_long_names_leave_room_for_the_field(page: Page, plan_path: Path) -> None:
+    """Of 300 letters the field's name took half the screen, and one in a message ran out of it."""
+    plan, named = read_plan(plan_path), plan_path.with_name(f"{'x' * 200}.gpkg")
+    save_plan(replace(plan, field=replace(plan.field, name="Nord " * 60)), named)
+    with served(named) as (address, _):
+        again = Page(page.driver, address)
+        again.button("next")
+        again.button("confirm")
+        again.wait(lambda: again.judged() == 1)
+        again.button("save")
+        again.wait(lambda: "Saved in xxx" in again.text("message"))
+        high, wide, room = again.run(
+            "const [one, title] = ['message', 'title'].map(id => document.getElementById(id));"
+            "return [title.clientHeight, one.scrollWidth, one.clientWidth];"
+        )
+    assert high < 60
+    assert wide <= room
 
 
 @pytest.mark.parametrize("size", [(390, 844), (360, 640), (640, 360), (900, 420), (768, 1024)])

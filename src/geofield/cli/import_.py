@@ -7,9 +7,8 @@ from pathlib import Path
 import click
 
 from geofield.cli.console import echo_json, say
-from geofield.cli.files import PATH, claim_file, output_option
+from geofield.cli.files import PATH, claim_plan, output_option
 from geofield.cli.options import without_blanks
-from geofield.errors import FormatError
 from geofield.wording import counted
 
 
@@ -55,9 +54,7 @@ def import_(
     from geofield.formats.importing import merged, recorded
     from geofield.plan_files import staged_plan
 
-    if output.suffix.lower() != ".gpkg":
-        raise FormatError(f"{output} is not a GeoPackage name.", hint="Write NAME.gpkg.")
-    claim_file(output)
+    claim_plan(output)
     dataset = recorded(merged([read_dataset(file, crs=crs) for file in files], name=name))
     with staged_plan(output, overwrite=overwrite, inputs=files) as staging:
         shown = {"picture": dataset.picture_lies_in(output.parent)}

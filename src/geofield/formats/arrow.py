@@ -69,8 +69,10 @@ def writing(path: Path) -> Iterator[None]:
     try:
         yield
     except RuntimeError as error:  # which all errors of pyogrio are
+        # Before them stands the statement that failed, of a new GeoPackage six thousand letters.
+        words = str(error).rpartition(" failed: ")[2]
         raise FormatError(
-            f"{path.name} could not be written: {error}.", hint=disk_hint(path)
+            f"{path.name} could not be written: {words}.", hint=disk_hint(path)
         ) from error
 
 

@@ -6,6 +6,7 @@ in words why something was refused, and nothing has changed then.
 
 from __future__ import annotations
 
+import os
 import secrets
 import tempfile
 import threading
@@ -35,6 +36,9 @@ from geofield.staging import refuse_locked
 from geofield.theme import web_theme
 from geofield.web.view import margin_bounds, place_table
 from geofield.windows import scene_of_plan
+
+#: Bytes of a plan's name: 255 are allowed, and its notes and copies have longer ones.
+_LONGEST_NAME = 220
 
 
 class Desk:
@@ -74,7 +78,12 @@ class Desk:
                 f"{self.path.name} {unread}: the tracks here are planned anew, and to save "
                 "replaces those in the file."
             )
-        told = filter(None, [self.brought_back, unread, unshown])
+        misnamed = None
+        if self.path.suffix != ".gpkg":
+            misnamed = (
+                f"{self.path.name} is not named as a plan, NAME.gpkg: save under another name."
+            )
+        told = filter(None, [self.brought_back, misnamed, unread, unshown])
         self.brought_back = " ".join(told) or None
         self.seen, self.journal, self.session, self.picture = seen, journal, session, picture
         #: Tells this reading of file and picture from every other one.
@@ -305,7 +314,9 @@ class Desk:
         """A new file in the plan's folder: the page names no other folder."""
         if not name or Path(name).name != name or name.startswith("."):
             raise FormatError(f"{name!r} is no plain file name.")
-        place = self.path.with_name(name if name.endswith(".gpkg") else f"{name}.gpkg")
+        place = self.path.with_name(f"{name.removesuffix('.gpkg')}.gpkg")
+        if len(os.fsencode(place.name)) > _LONGEST_NAME:
+            raise FormatError("That name is too long for a file.", hint="Choose another name.")
         if place.exists():
             raise FormatError(f"{place.name} is there already.", hint="Choose another name.")
         return place

@@ -3,6 +3,8 @@
 
 export const SAID = {
   en: [
+    [/^Stages write NAME\.gpkg, in small letters.*$/, "Save your edits under another name (see More)."],
+    [/^The (outline|obstacle) crosses itself .*$/, "The $1 crosses itself."],
     [/^Give the distance between two tracks in metres.*$/, "Give the distance between two tracks in metres, for instance 3."],
     [/^Give the radius in metres, or leave it out for a route without curves\.$/, "Draw the outline wider, or choose no route."],
     [/^Choose a wider headland, or none.*$/, "Choose a wider headland, or 0 for none."],
@@ -90,6 +92,10 @@ export const SAID = {
     [/^Reload it \(edits made here.*$/, "Laden Sie sie neu (Ihre Änderungen werden noch einmal gemacht, wo sie passen), oder speichern Sie unter anderem Namen: siehe Mehr."],
     [/^(.*) is open in another program .*$/, "$1 ist in einem anderen Programm geöffnet."],
     [/^Close it there .*$/, "Schließen Sie sie dort und speichern Sie noch einmal."],
+    [/^(.*) is not named as a plan, NAME\.gpkg: save under another name\.$/, "$1 heißt nicht wie ein Plan (NAME.gpkg): speichern Sie unter einem anderen Namen."],
+    [/^(.*) is not a GeoPackage name\.$/, "$1 ist kein Name eines GeoPackage."],
+    [/^Stages write NAME\.gpkg, in small letters.*$/, "Speichern Sie unter einem anderen Namen (siehe Mehr)."],
+    [/^That name is too long for a file\.$/, "Dieser Name ist zu lang für eine Datei."],
     [/^(.*) is there already\.$/, "$1 gibt es schon."],
     [/^Choose another name\.$/, "Wählen Sie einen anderen Namen."],
     [/^'(.*)' is no plain file name\.$/, "„$1“ ist kein einfacher Dateiname."],
