@@ -161,6 +161,9 @@ def test_a_click_draws_no_circle_and_tells_how_it_is_done(page: Page) -> None:
     page.press(Keys.ESCAPE, "a")
     page.drag((x, y), (x + 20, y), back=True)
     time.sleep(0.3)
+    page.run("document.querySelector('[data-tool=direction]').click()")  # a click told nothing
+    page.click(x, y)
+    page.wait(lambda: "Turn the tracks: press and drag" in page.text("message"))
     after = page.state()
     assert (after["obstacles"], after["can_undo"]) == (before["obstacles"], False)
 
@@ -258,7 +261,7 @@ def test_bad_edits_are_refused_in_place_and_the_old_tracks_stay(page: Page) -> N
     page.press("o")
     high = max(place[1] for place in ring)
     page.drag(tuple(corner), (left - 10, high - 70))
-    page.wait(lambda: "crosses itself" in page.text("message"))
+    page.wait(lambda: "The outline crosses itself. Move" in page.text("message"))
     assert page.state()["field"]["rings"] == before["field"]["rings"]
     assert page.state()["tracks"] == before["tracks"]
 

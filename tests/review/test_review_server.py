@@ -301,6 +301,17 @@ def test_a_plan_in_capitals_is_saved_under_another_name(plan_path: Path) -> None
     assert saved.set_index("obstacle_no").loc[3, "status"] == "rejected"
 
 
+def test_ground_off_the_picture_is_refused_as_everything_there_is(
+    visitor: Visitor, plan_path: Path
+) -> None:
+    """The page spoke of an option of the command, in English."""
+    visitor.post("/api/take", {})
+    left, bottom, _, _ = Desk(plan_path).opening()["bounds"]
+    ground = {"do": "ground", "place": [left - 20, bottom - 20], "belongs": True}
+    status, answer = visitor.post("/api/edit", ground)
+    assert (status, answer["message"]) == (422, "That place lies outside the picture.")
+
+
 def test_no_session_is_ended_from_the_page_whose_edits_lie_nowhere(
     visitor: Visitor, plan_path: Path
 ) -> None:

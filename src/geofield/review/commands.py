@@ -220,7 +220,7 @@ def _with_row(plan: Plan, command: Command, values: Mapping[str, Any]) -> Plan:
 
 def _reshaped(plan: Plan, command: Command, shape: Any, values: Mapping[str, Any]) -> Plan:
     """A shape or place that a person gave says that the thing is there."""
-    _on_the_picture(plan, shape)
+    on_the_picture(plan, shape)
     status = "added" if _row(plan, command)["status"] == "added" else "confirmed"
     return _with_row(plan, command, {**values, "status": status, "geometry": shape})
 
@@ -228,7 +228,7 @@ def _reshaped(plan: Plan, command: Command, shape: Any, values: Mapping[str, Any
 def _added(plan: Plan, footprint: Polygon, x: float, y: float, *, radius_m: float | None) -> Plan:
     import pandas as pd
 
-    _on_the_picture(plan, footprint)
+    on_the_picture(plan, footprint)
     # A shape is avoided as it was drawn, in every program; a crown gets the usual margin.
     settings = plan.settings or Settings()
     buffer_m = 0.0 if radius_m is None else settings.obstacles.buffer_m
@@ -253,7 +253,7 @@ def _added(plan: Plan, footprint: Polygon, x: float, y: float, *, radius_m: floa
     return replace(plan, obstacles=joined)
 
 
-def _on_the_picture(plan: Plan, shape: Any) -> None:
+def on_the_picture(plan: Plan, shape: Any) -> None:
     """Refuse what lies off the picture: nobody can have seen it there."""
     if plan.grid is None:
         return

@@ -9,12 +9,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import shapely
+
 from geofield.crs import GEOD, LONLAT, transformer
 from geofield.earlier import bars_points
 from geofield.model.evidence import outline_record
 from geofield.model.scene import Scene
 from geofield.plan import Plan
-from geofield.review.commands import Command, EditError, places_of
+from geofield.review.commands import Command, EditError, on_the_picture, places_of
 from geofield.settings import Settings
 
 #: Clicks nearer than this are on the same place, metres.
@@ -44,6 +46,7 @@ class Ground:
             When the place lies outside the picture or contradicts an earlier one.
         """
         ((x, y),) = places_of([command.get("place")])
+        on_the_picture(plan, shapely.Point(x, y))
         barred = bars_points(plan)
         if barred is not None:
             raise EditError(

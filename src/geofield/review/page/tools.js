@@ -129,6 +129,7 @@ const MAKERS = {
     draw.on("drawstart", ({feature}) => feature.getGeometry().on("change", ({target}) => {
       if (target.getLength() > 2) live(command(target));
     }));
+    draw.on("drawabort", () => active === "direction" && desk.explain("k_turn"));
     draw.on("drawend", async ({feature}) => {
       await commit(command(feature.getGeometry()));
       doneWith(draw);
