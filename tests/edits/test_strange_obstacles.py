@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import geopandas as gpd
+import numpy as np
 import pandas as pd
 import pytest
 import shapely
@@ -12,6 +14,7 @@ from changed_plans import Frame, at, geofield, plan_in, rewritten, rows
 
 from geofield.errors import FormatWarning
 from geofield.model.review import reconcile
+from geofield.model.written import same_shapes
 from geofield_command import run_geofield
 
 
@@ -123,3 +126,26 @@ def test_the_number_of_what_was_taken_away_is_no_other_s(folder: Path, typed: in
     rewritten(file, "obstacles", drawn)
     geofield("tracks", file, "-o", file)
     assert rows(plan_in(folder))["status"][last + 2] == "added"
+
+
+def test_places_in_another_order_are_the_same_shape_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """To measure how far apart 300 such are took 40 ms of each edit's 100 on the review page."""
+    measured: list[int] = []
+    hausdorff_distance = shapely.hausdorff_distance
+
+    def counted(one: Any, other: Any) -> Any:
+        measured.append(len(one))
+        return hausdorff_distance(one, other)
+
+    monkeypatch.setattr(shapely, "hausdorff_distance", counted)
+    two = [shapely.box(0, 0, 2, 2), shapely.box(5, 0, 6, 9)]
+    disc = shapely.Point(5e5, 4e6).buffer(3.0)
+    ring = np.array(disc.exterior.coords[:-1])
+    turned = shapely.Polygon(np.roll(ring, 7, axis=0)[::-1] + 0.001)
+    finer = shapely.segmentize(disc, 0.1)
+    one = [disc, disc, shapely.MultiPolygon(two), disc, disc]
+    others = [turned, finer, shapely.MultiPolygon(two[::-1]), disc.buffer(0.03), None]
+    assert same_shapes(one, others).tolist() == [True, True, True, False, False]
+    assert sum(measured) == 1

@@ -214,12 +214,14 @@ def same_shapes(one: Any, other: Any, tolerance_m: float = SAME_M) -> NDArray[np
     one, other = np.asarray(one, dtype=object), np.asarray(other, dtype=object)
     result = np.asarray(shapely.equals_exact(one, other, tolerance=tolerance_m), dtype=bool)
     rest = np.flatnonzero(~result)
-    if len(rest):
-        one, other = one[rest], other[rest]
-        # Lines through the same places in another order are near each other everywhere.
-        gained = np.abs(shapely.area(one) - shapely.area(other))
-        near = shapely.hausdorff_distance(one, other) <= tolerance_m
-        result[rest] = near & (gained <= tolerance_m * shapely.length(one))
+    # Most are the same places in another order: to measure how far lines are apart takes 50 times
+    # as long, and is needed where their number is another one.
+    ordered = shapely.normalize(one[rest]), shapely.normalize(other[rest])
+    result[rest] = shapely.equals_exact(*ordered, tolerance=tolerance_m)
+    rest = rest[~result[rest]]
+    gained = np.abs(shapely.area(one[rest]) - shapely.area(other[rest]))
+    rest = rest[gained <= tolerance_m * shapely.length(one[rest])]
+    result[rest] = shapely.hausdorff_distance(one[rest], other[rest]) <= tolerance_m
     return result
 
 
