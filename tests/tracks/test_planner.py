@@ -712,6 +712,20 @@ def test_points_follow_a_segment_that_a_person_bent() -> None:
     assert figures.worked_ha == pytest.approx(strip.area / 1e4, rel=0.01)
 
 
+def test_the_area_worked_by_ten_thousands_of_tracks_is_known_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """0.01 m typed as spacing held the review page for minutes, and again when it was opened anew.
+
+    The first track, in the corner, is too short to tell the way of all.
+    """
+    corner: Any = Polygon([(X, Y), (X + 150, Y + 120.3), (X + 170, Y + 20)])
+    tracks = plan_tracks(corner, crs=CRS, spacing_m=0.01, direction=17.3)
+    assert len(tracks.lines) > 10_000
+    monkeypatch.setattr(shapely, "union_all", None)  # it took the minutes
+    assert tracks.statistics.coverage_percent == pytest.approx(100.0, abs=0.01)
+
+
 def test_tips_of_sharp_corners_are_not_worked() -> None:
     spike: Any = Polygon([(X, Y), (X + 300, Y), (X, Y + 40)])
     tracks = plan_tracks(spike, crs=CRS, spacing_m=10.0, headland_m=10.0)

@@ -18,8 +18,11 @@ MITRE_LIMIT = 2.0
 #: Edges that two areas share differ in their last digits, metres: what lies between has no area,
 #: but is as long as they are.
 SHARED_EDGE_M = 1e-4
-#: Rows are parallel where their ends are no farther off, share of the spacing.
-_STRAIGHT = 1e-6
+#: Rows are parallel where their ends are no farther off, share of the spacing; and metres, as
+#: coordinates of millions of metres are no finer.
+_STRAIGHT, _FINEST_M = 1e-6, 1e-8
+#: So many rows are cut at once: more take longer for each, fewer cut a long outline more often.
+_TOGETHER = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +111,9 @@ def worked(
     row = None if headland_tracks is not None else _rows_apart(segments, width)
     if row is not None:
         # Strips of every other track do not even touch: their union is the list of them.
-        even = row % 2 == 0
-        rows = [shapely.multipolygons(strips[even]), shapely.multipolygons(strips[~even])]
+        group = row // _TOGETHER * 2 + row % 2
+        order = np.argsort(group, kind="stable")
+        rows = shapely.multipolygons(strips[order], indices=group[order])
         alone = float(shapely.area(shapely.intersection(rows, outline)).sum())
         return alone, alone
     together = shapely.union_all(strips)
@@ -128,19 +132,22 @@ def _rows_apart(segments: gpd.GeoDataFrame, width: float) -> NDArray[np.int64] |
     if not len(segments) or not _is_straight(segments.geometry.to_numpy()).all():
         return None
     ends = shapely.get_coordinates(segments.geometry.to_numpy()).reshape(-1, 2, 2)
-    along = ends[0, 1] - ends[0, 0]
+    # The way of a short one is known to some digits only.
+    along = (ends[:, 1] - ends[:, 0])[np.argmax(shapely.length(segments.geometry.to_numpy()))]
     along /= np.hypot(*along)
     start, end = ((ends - ends[0, 0]) @ along).T
     across = (ends - ends[0, 0]) @ np.array([-along[1], along[0]])
-    if np.abs(across[:, 1] - across[:, 0]).max() > _STRAIGHT * width:
-        return None
     number = segments["track_no"].to_numpy(dtype=np.int64)
+    _, first, track = np.unique(number, return_index=True, return_inverse=True)
     # Ends of one row differ in their last digits.
-    order = np.lexsort((start, number, np.rint(across[:, 0] / (_STRAIGHT * width))))
+    level = across[first, 0][track]
+    if np.abs(across - level[:, None]).max() > max(_STRAIGHT * width, _FINEST_M):
+        return None
+    order = np.lexsort((start, level))
     same = number[order][1:] == number[order][:-1]
-    step = np.diff(across[order, 0])
     behind = start[order][1:] - end[order][:-1] > 0.0
-    if not np.where(same, behind, step >= width * (1.0 - 1e-9)).all():
+    step = np.diff(level[order])
+    if not np.where(same, behind, step >= width - _FINEST_M).all():
         return None
     row = np.empty(len(order), np.int64)
     row[order] = np.append(0, np.cumsum(~same))
