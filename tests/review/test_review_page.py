@@ -19,6 +19,7 @@ import pytest
 import shapely
 from axe_core_python.selenium import Axe
 from browser import Page, chromium, served
+from pyproj import CRS
 from selenium import webdriver
 from selenium.common.exceptions import NoAlertPresentException
 from selenium.webdriver.common.action_chains import ActionChains
@@ -29,6 +30,7 @@ from shapely.geometry.base import BaseGeometry
 
 from geofield.errors import TrackError, TrackWarning
 from geofield.model.evidence import Evidence
+from geofield.model.searched import unsearched
 from geofield.notes import listening
 from geofield.plan import read_plan
 from geofield.plan_files import save_plan
@@ -706,6 +708,7 @@ def test_notes_of_tracks_are_in_german(page: Page) -> None:
         with pytest.raises(TrackError) as error:
             plan_tracks(square, crs=32636, **settings)
         notes.append(error.value.message)
+    notes.append(unsearched("POLYGON EMPTY", square, CRS(32636)))
     page.run("localStorage.setItem('language', 'de')")
     page.driver.refresh()
     told = page.driver.execute_async_script(

@@ -28,6 +28,7 @@ export const SAID = {
     [/^borders close inside it are nearly as strong as its own$/, "Grenzen dicht im Inneren sind fast so stark wie sein eigener Rand"],
     [/^much of its course is crooked$/, "vieles an seinem Verlauf ist krumm"],
     [/^The picture does not show (.*) of the field: .*$/, "Das Bild zeigt $1 des Feldes nicht: was dort steht, ist nicht gefunden."],
+    [/^Nobody searched (.*) that the outline gained: .*$/, "Auf $1, die der Umriss gewonnen hat, hat niemand gesucht: was dort steht, ist nicht bekannt."],
     [/^The picture is coarse \((.*) m per pixel\): crowns below (.*) m .*$/, "Das Bild ist grob ($1 m je Pixel): Kronen unter $2 m Radius sind Zufall."],
     [/^The picture has hardly any contrast .*$/, "Das Bild hat kaum Kontrast (Dunst oder nur Boden): Bäume können fehlen."],
     [/^The field is too large to search .*$/, "Das Feld ist zu groß, um nach etwas anderem als Bäumen zu suchen."],
