@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast, get_args
 
+import geopandas as gpd
 import pytest
 import shapely
 from axe_core_python.selenium import Axe
@@ -297,6 +298,38 @@ def test_an_outline_without_room_for_turns_is_refused_when_it_is_drawn(
             page.click(x + corner[0], y + corner[1])
         page.wait(lambda: len(page.state()["field"]["rings"][0]) == 4)
         assert not page.complaints()
+
+
+def test_an_outline_that_allows_no_tracks_is_shown_and_put_right(
+    driver: webdriver.Chrome, plan_path: Path
+) -> None:
+    """Made in another program, it could not even be opened here."""
+    wide = ["--spacing", "4", "--route", "boustrophedon", "--turning-radius", "20"]
+    run_geofield("tracks", plan_path, "-o", plan_path, "--overwrite", *wide, check=True)
+    field = gpd.read_file(plan_path, layer="field")
+    whole = field.geometry[0]
+    x, y = whole.representative_point().coords[0]
+    field.geometry = [shapely.box(x - 10, y - 10, x + 10, y + 10)]
+    field.to_file(plan_path, layer="field", driver="GPKG", geometry_name="geom")
+    with served(plan_path) as (address, _):
+        page = Page(driver, address)
+        page.wait(lambda: "no tracks for this outline: draw it anew" in page.text("message"))
+        assert "radius of 20 m is larger than the field" in page.text("notes")
+        assert page.text("figures") == ""
+        assert page.state()["tracks"] == []
+        page.button("save")
+        page.wait(lambda: "no turn fits" in page.text("message"))
+        page.run("document.querySelector('#alternatives button').click()")
+        page.wait(lambda: len(page.state()["tracks"]) > 5)
+        assert page.text("figures").startswith(f"{whole.area / 1e4:.2f} ha")
+        page.button("undo")
+        page.wait(lambda: page.text("figures") == "")
+        page.button("redo")
+        page.wait(lambda: page.text("figures") != "")
+        page.button("save")
+        page.wait(lambda: "Saved" in page.text("message"))
+        assert not page.complaints()
+    assert read_plan(plan_path).field.area_ha == pytest.approx(whole.area / 1e4, rel=0.01)
 
 
 def test_what_is_typed_is_saved_with_a_comma_and_beside_other_edits(

@@ -67,7 +67,13 @@ class Desk:
         ground = None if self._picture_path is None else Ground(self._scene_of)
         session = Session(plan, ground)
         self.brought_back = journal.replay(session)
-        if self.brought_back is None and session.outdated:
+        unplanned = None
+        if session.plan.tracks is None and session.unplanned is not None:
+            unplanned = (
+                "There are no tracks for this outline: draw it anew, or change the settings. "
+                f"{session.unplanned.message}"
+            )
+        elif self.brought_back is None and session.outdated:
             self.brought_back = (
                 "Field, obstacles or tracks were edited after the tracks had been planned; the "
                 "tracks here are planned anew, with what you changed of them. Save them."
@@ -83,7 +89,7 @@ class Desk:
             misnamed = (
                 f"{self.path.name} is not named as a plan, NAME.gpkg: save under another name."
             )
-        told = filter(None, [self.brought_back, misnamed, unread, unshown])
+        told = filter(None, [self.brought_back, unplanned, misnamed, unread, unshown])
         self.brought_back = " ".join(told) or None
         self.seen, self.journal, self.session, self.picture = seen, journal, session, picture
         #: Tells this reading of file and picture from every other one.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from geofield.earlier import is_planned
+from geofield.errors import TrackError
 from geofield.notes import listening
 from geofield.pipeline import run_tracks, tracks_of_plan
 from geofield.plan import Plan
@@ -45,7 +46,8 @@ class Session:
     ----------
     plan : Plan
         Field and obstacles count as they are; tracks are planned where there are none, or where
-        they are of before a person's edits in another program.
+        they are of before a person's edits in another program. Where none can be planned it is
+        shown without, until an edit mends that.
     ground : Ground, optional
         Finds the outline again for the edit ``ground``.
     """
@@ -55,7 +57,14 @@ class Session:
         as_shown = plan.tracks is not None and is_planned(plan)
         #: Whether what lies in the file was edited since its tracks were planned.
         self.outdated = plan.tracks is not None and not as_shown
-        first = Step(plan) if as_shown else planned(plan, None, with_route=False)
+        #: Why no tracks can be planned for what lies in the file.
+        self.unplanned: TrackError | None = None
+        try:
+            first = Step(plan) if as_shown else planned(plan, None, with_route=False)
+        except TrackError as error:
+            # The outline or the settings are put right here, as nothing else can.
+            self.unplanned = error
+            first = Step(replace(plan, tracks=None), notes=(error.message,))
         self._steps = [first]
         self._at = 0
         self._saved: Step | None = first if as_shown else None
@@ -130,10 +139,18 @@ class Session:
         return self.step
 
     def whole(self) -> Step:
-        """The state that is shown, with its route: what is written."""
+        """The state that is shown, with its route: what is written.
+
+        Raises
+        ------
+        TrackError
+            When it has no tracks, as none could be planned.
+        """
         from geofield.tracks import route_with_settings
 
         plan = self.plan
+        if plan.tracks is None and self.unplanned is not None:
+            raise self.unplanned
         if self.step.waits and plan.tracks is not None and plan.settings is not None:
             with listening():  # the tracks tell it
                 tracks = route_with_settings(plan.tracks, plan.settings.tracks, plan.field.polygon)

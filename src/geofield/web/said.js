@@ -105,6 +105,7 @@ export const SAID = {
     [/^(.*) is not there any more: another program.*$/, "$1 ist nicht mehr da: ein anderes Programm hat die Datei verschoben oder gelöscht."],
     [/^Save your edits under another name, or put the file back\.$/, "Speichern Sie unter anderem Namen (siehe Mehr) oder legen Sie die Datei zurück."],
     [/^Field, obstacles or tracks were edited after the tracks had been planned;.* Save them\.$/, "Feld, Hindernisse oder Spuren wurden geändert, nachdem die Spuren geplant waren; hier sind die Spuren neu geplant. Speichern Sie sie."],
+    [/^There are no tracks for this outline: draw it anew, or change the settings\.$/, "Für diesen Umriss gibt es keine Spuren: zeichnen Sie ihn neu, oder ändern Sie die Einstellungen."],
     [/^(.*) has (?:no|lost the) record of .*: the tracks here are planned anew.*file\.$/, "$1 weiß nicht mehr, wie die Spuren darin geplant waren (eingelesen, oder die Kopie eines anderen Programms?): hier sind sie neu geplant, und Speichern ersetzt die in der Datei."],
     [/^Go on there, or take over here\.$/, "Machen Sie dort weiter, oder übernehmen Sie hier."],
     [/^The plan was changed since an earlier session .*: (\d+) of its (\d+) edits? (?:was|were) made again\. Make these by hand: (.*)\. All are kept in (.*)\.$/, "Der Plan wurde geändert, seit eine Sitzung ohne Speichern endete: $1 ihrer $2 Änderungen sind wieder da. Diese machen Sie bitte von Hand: $3. Alle liegen in $4."],

@@ -36,8 +36,8 @@ def tracks_view(tracks: Tracks | None, area_ha: float, notes: Sequence[str] = ()
         Told beside the tracks' own.
     """
     if tracks is None:
-        names = ("tracks", "gaps", "headland", "route", "drive", "notes")
-        return {**{name: [] for name in names}, "figures": {}}
+        names = ("tracks", "gaps", "headland", "route", "drive")
+        return {**{name: [] for name in names}, "figures": {}, "notes": list(notes)}
     numbers = tracks.segments["track_no"].to_numpy(dtype=np.int64).tolist()
     gaps, around, turns = tracks.gaps, tracks.headland_tracks, tracks.turns
     return {

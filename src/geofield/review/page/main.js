@@ -96,7 +96,8 @@ function show(answer) {
 function showTracks(answer, moving = false) {
   maps.showTracks(answer, moving);
   const f = answer.figures;
-  if (f.tracks === undefined) return;
+  $("notes").replaceChildren(...answer.notes.map(text => node("li", told(text))));
+  if (f.tracks === undefined) return [$("figures"), $("facts")].forEach(one => one.replaceChildren());
   const unfit = f.turns_that_do_not_fit ? ` · ${t("unfit", {n: f.turns_that_do_not_fit})}` : "";
   const waits = answer.route_waits ?? state.settings.route !== "none" ? ` · ${t("route_waits")}` : "";
   $("figures").textContent = `${number(f.area_ha, 2)} ha · ${t(f.tracks === 1 ? "one_track" : "n_tracks", {n: f.tracks})} · ${number(f.length_m / 1000, 2)} km · ${t("covered", {p: number(f.coverage_percent, 1)})}${unfit}${waits}`;
@@ -105,7 +106,6 @@ function showTracks(answer, moving = false) {
     ["heading", heading(f.heading_deg)], ["lost_all", `${number(f.lost_m)} m`]];
   if (f.turns !== null) facts.push(["turns", number(f.turns)]);
   $("facts").replaceChildren(...facts.flatMap(([name, value]) => [node("dt", t(name)), node("dd", value)]));
-  $("notes").replaceChildren(...answer.notes.map(text => node("li", told(text))));
 }
 
 const node = (tag, text) => Object.assign(document.createElement(tag), {textContent: text});
