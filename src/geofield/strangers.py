@@ -36,6 +36,8 @@ PICTURES = (
     b"II*\0", b"MM\0*", b"II+\0", b"MM\0+", b"\x89PNG", b"\xff\xd8\xff", b"\0\0\0\x0cjP",
 )  # fmt: skip
 _HEAD_BYTES = 1 << 18
+#: The file code that every .shp begins with, 9994.
+_SHAPEFILE = (9994).to_bytes(4)
 _HINT = "Nothing was read. Ask its maker for a file without it."
 #: Elements inside elements; an honest file needs about 20.
 MAX_DEPTH = 200
@@ -104,9 +106,8 @@ def check_vector(path: Path | str) -> None:
         raise FormatError(f"{file} cannot be read: {error.strerror}.") from None
     if not head:
         raise FormatError(f"{file} is empty (0 bytes).", hint="Copy it again.")
-    if file.suffix.lower() == ".shp" and not any(
-        file.with_suffix(suffix).exists() for suffix in (".shx", ".SHX")
-    ):
+    index = (file.with_suffix(suffix) for suffix in (".shx", ".SHX"))
+    if head.startswith(_SHAPEFILE) and not any(each.exists() for each in index):
         raise FormatError(
             f"{file.name} lacks its .shx index.", hint="Copy all files of the Shapefile."
         )

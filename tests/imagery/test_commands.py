@@ -200,7 +200,7 @@ def test_what_a_picture_does_not_say_is_said_to_tiles(capsys: pytest.CaptureFixt
     lon, lat = read_scene(path, **known).grid.centre_lonlat
     place = ["--lat", lat, "--lon", lon]
     assert run("tiles", path, *place, "-o", "a.tif") == 1
-    assert "--crs EPSG:32633" in capsys.readouterr().err
+    assert "--crs EPSG:32636" in capsys.readouterr().err
     said = ["--crs", known["crs"], "--bands", ",".join(known["bands"])]
     assert run("tiles", path, *place, *said, "-o", "a.tif") == 0
     assert "changes nothing" not in capsys.readouterr().err
