@@ -55,17 +55,14 @@ def parcels_in(file: Path, settings: Settings, crs: str | None) -> Places:
     TrackError
         When it holds no polygons.
     """
-    import numpy as np
-
     from geofield.farm.place_reader import read_places
 
     places = read_places(file, settings=settings, crs=crs, unnamed=file.stem)
     if places.outlines is None:
         raise TrackError(f"{file} holds no polygons.", hint="Give a file of field outlines.")
-    known = np.isfinite(places.lat) & np.isfinite(places.lon)
-    if not known.all():
-        say_note(f"{file.name}: {without_shape(places.rows[~known].tolist(), 'left out')}")
-        places = places.only(np.flatnonzero(known))
+    if lost := places.rows[~places.known].tolist():
+        say_note(f"{file.name}: {without_shape(lost, 'left out')}")
+        places = places.only(places.known)
     return tell_places(places)
 
 

@@ -32,8 +32,7 @@ def refuse_elsewhere(path: Path, places: Places, settings: Settings) -> None:
     """
     if path.is_dir() or path.suffix.lower() not in (".tif", ".tiff", ".vrt", ".jp2", ".img"):
         return  # many pictures: each place looks for its own
-    known = np.isfinite(places.lat) & np.isfinite(places.lon)
-    lat, lon = places.lat[known], places.lon[known]
+    lat, lon = places.lat[places.known], places.lon[places.known]
     grid = grid_of(path, settings)
     if _inside(grid, lat, lon).any() or _shows_outlines(grid, places):
         return

@@ -77,15 +77,20 @@ class Places:
         return len(self.ids)
 
     @property
+    def known(self) -> NDArray[np.bool_]:
+        """Of each row whether it says where it is."""
+        return np.asarray(np.isfinite(self.lat) & np.isfinite(self.lon))
+
+    @property
     def parcels(self) -> bool:
         """Whether every place is a parcel, but for rows that say nothing of where they are."""
         if self.outlines is None:
             return False
-        known = np.isfinite(self.lat) & np.isfinite(self.lon)
-        return not (known & self.outlines.is_null().to_numpy(zero_copy_only=False)).any()
+        return not (self.known & self.outlines.is_null().to_numpy(zero_copy_only=False)).any()
 
-    def only(self, positions: NDArray[np.int64]) -> Places:
+    def only(self, chosen: NDArray[np.bool_]) -> Places:
         """Some of the places, as if the others were not in the file."""
+        positions = np.flatnonzero(chosen)
         return replace(
             self,
             ids=self.ids.take(positions),
@@ -128,7 +133,7 @@ class Places:
 
     def order(self) -> NDArray[np.int64]:
         """Positions along a space-filling curve (Hilbert's): neighbours beside each other."""
-        known = np.isfinite(self.lat) & np.isfinite(self.lon)
+        known = self.known
         far = np.full(len(self), np.iinfo(np.int64).max)
         if known.any():
             points = gpd.GeoSeries(gpd.points_from_xy(self.lon[known], self.lat[known]))

@@ -97,7 +97,11 @@ function showTracks(answer, moving = false) {
   maps.showTracks(answer, moving);
   const f = answer.figures;
   $("notes").replaceChildren(...answer.notes.map(text => node("li", told(text))));
-  if (f.tracks === undefined) return [$("figures"), $("facts")].forEach(one => one.replaceChildren());
+  if (f.tracks === undefined) {
+    $("figures").replaceChildren();
+    $("facts").replaceChildren();
+    return;
+  }
   const unfit = f.turns_that_do_not_fit ? ` · ${t("unfit", {n: f.turns_that_do_not_fit})}` : "";
   const waits = answer.route_waits ?? state.settings.route !== "none" ? ` · ${t("route_waits")}` : "";
   $("figures").textContent = `${number(f.area_ha, 2)} ha · ${t(f.tracks === 1 ? "one_track" : "n_tracks", {n: f.tracks})} · ${number(f.length_m / 1000, 2)} km · ${t("covered", {p: number(f.coverage_percent, 1)})}${unfit}${waits}`;
