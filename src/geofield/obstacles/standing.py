@@ -35,6 +35,8 @@ _EXPLAINED, _CROWN_REACH = 0.5, 1.2
 """Of a thing's cells within so many radii of a tree: then it is the tree, or its shade."""
 _CLEAR_CELLS = 8
 _ALL_AROUND = np.ones((3, 3), bool)
+_NECK_CELLS = 0.02
+"""So far cells that meet at a corner alone are grown, to be one polygon when files round, too."""
 CELL_M = CELL_PX * WORKING_RESOLUTION_M
 
 
@@ -167,7 +169,8 @@ def _outline(part: NDArray[np.bool_]) -> shapely.Polygon:
         for shape, _ in shapes(filled, mask=filled.astype(bool), connectivity=8)
     ]
     largest = max(rings, key=lambda ring: ring.area)
-    simple = largest.buffer(0).simplify(0.75)
-    if simple.is_empty or not isinstance(simple, shapely.Polygon):
-        return largest
+    # Where cells meet at a corner alone, the ring touches itself: no polygon without a neck.
+    neck_cells = 0.0 if largest.is_valid else _NECK_CELLS
+    joined = largest.buffer(neck_cells, join_style="mitre")
+    simple: shapely.Polygon = shapely.simplify(joined, 0.75)
     return simple
