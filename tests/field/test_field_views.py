@@ -8,6 +8,7 @@ import shapely
 
 from geofield.errors import FieldError, PointOutsideError
 from geofield.field import FieldSearch, extract_field, prepare_field
+from geofield.field.frame import Frame
 from geofield.field.part import Part
 from geofield.raster import resample
 from geofield.simulate import SimulationSettings, simulate_field
@@ -241,6 +242,21 @@ def test_a_slanting_end_of_data_is_judged_as_the_frame_is():
     found, there = part.polygon_px(grid), truth.intersection(shown)
     assert found.intersection(there).area > 0.975 * found.union(there).area
     assert 0.05 < dict(part.quality.figures)["edge_share"] < 0.5
+
+
+@pytest.mark.parametrize("factor", [1, 2, 3])
+def test_the_frame_of_a_reduced_picture_is_the_end_of_the_data_around_the_seed(factor):
+    scene = simulate_field(1, SIDE).scene
+    valid = np.zeros(scene.valid.shape, bool)
+    valid[12:90, 30:102] = valid[120:240, 150:252] = True
+    scene = replace(scene, valid=valid)
+    for (x, y), end in (((60, 50), (30, 12, 102, 90)), ((200, 180), (150, 120, 252, 240))):
+        frame = Frame.of(scene, factor, (x / factor, y / factor), 1)
+        assert frame.shape == (-(-256 // factor), -(-256 // factor))
+        assert frame.shown is not None
+        # Straightened by up to three pixels, outwards.
+        beyond = (np.array(frame.shown.bounds) - np.array(end) / factor) * [-1, -1, 1, 1]
+        assert ((beyond > -0.1) & (beyond < 3.1)).all()
 
 
 def test_what_values_lie_where_there_are_no_data_changes_nothing():

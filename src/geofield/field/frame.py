@@ -41,7 +41,7 @@ class Frame:
     shown: Polygon | None = None
 
     @classmethod
-    def of(cls, scene: Scene, factor: int, seed_px: tuple[float, float], times: int = 1) -> Frame:
+    def of(cls, scene: Scene, factor: int, seed_px: tuple[float, float], times: int) -> Frame:
         """Of a scene reduced by a factor, around a seed in its pixel coordinates.
 
         Parameters
