@@ -16,7 +16,7 @@ from geofield.field import FieldSearch, extract_field
 from geofield.field.border import measure
 from geofield.field.frame import Frame, covered
 from geofield.field.learned import Learned, shipped
-from geofield.field.likely import Candidate, likeliest
+from geofield.field.likely import Candidate, evidence_of, likeliest
 from geofield.field.network import BANDS, POINTS, SIDE_PX, normalised, points_maps
 from geofield.field.ranking import Ranking, exact, log_odds, trained
 from geofield.field.said import Said
@@ -54,6 +54,28 @@ def several():
 @pytest.fixture
 def figures(several):
     return several[0]
+
+
+def test_figures_of_what_points_say_are_as_they_are_defined():
+    """The ranking learned them so: with other ones its answer is that to another question."""
+    mask = np.zeros((20, 20), np.uint8)
+    mask[:10, :10] = 1
+    polygon = shapely.box(0, 0, 10, 10)
+    said = Said(np.where(mask, 0.8, 0.2).astype(np.float32)).figures(polygon, mask)
+    assert said["network_overlap"] == pytest.approx(0, abs=1e-5)  # 80 of 100 + 140 - 80
+    assert said["network_missed"] == pytest.approx(60 / 140)
+    assert said["network_fit_of_area"] == pytest.approx(np.log(0.02 - 4 * np.log(0.8)), abs=1e-5)
+    # What is quite sure is sure to half a percent.
+    sure = Said(mask.astype(np.float32)).figures(polygon, mask)
+    assert sure["network_fit_of_area"] == pytest.approx(np.log(0.02 - 4 * np.log(0.995)), abs=1e-4)
+
+
+def test_certainty_is_judged_by_the_beliefs_in_outlines_like_the_one_taken():
+    one = Candidate(shapely.box(0, 0, 9, 9), np.zeros((1, 1), bool), {"kept": 1.0}, 0.0)
+    belief, overlap = np.array([0.4, 0.3, 0.2, 0.1]), np.array([1.0, 0.96, 0.9, 0.5])
+    evidence = evidence_of(one, 0.5, belief, overlap)
+    expected = {"kept": 1.0, "expected_overlap": 0.0, "belief_alike": 0.9, "belief_same": 0.7}
+    assert evidence == pytest.approx(expected)
 
 
 def table(tmp_path, change):
