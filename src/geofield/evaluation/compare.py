@@ -115,8 +115,8 @@ def evaluate(
     for name in found:
         within = area.get(name) if isinstance(area, Mapping) else area
         a, b = compared(found[name], true[name], within)
-        centre_a, radius_a, _ = _circles(a)
-        centre_b, radius_b, has_radius = _circles(b)
+        centre_a, radius_a = _circles(a)
+        centre_b, radius_b = _circles(b)
         scale = _scale(np.vstack([centre_a, centre_b]), a.crs)
         _tell_elsewhere(centre_a / scale, centre_b / scale)
         match = match_points(centre_a / scale, centre_b / scale, distance_m)
@@ -124,8 +124,6 @@ def evaluate(
         if "kind" in a.columns:
             false_kinds.update(a["kind"].iloc[match.false_index].dropna())
         difference = radius_a[match.detected_index] - radius_b[match.truth_index]
-        if not has_radius:
-            difference = np.full(difference.shape, np.nan)
         rows[name] = Counts(match, difference)
     images = {name: score([counts]) for name, counts in rows.items()}
     pooled = score(list(rows.values()), bootstrap=bootstrap, seed=seed)
@@ -192,8 +190,8 @@ def _counting(frame: gpd.GeoDataFrame, area: Any) -> gpd.GeoDataFrame:
     return frame[keep]
 
 
-def _circles(frame: gpd.GeoDataFrame) -> tuple[FloatArray, FloatArray, bool]:
-    """Centres (n, 2) and radii (n,), and whether there are radii at all."""
+def _circles(frame: gpd.GeoDataFrame) -> tuple[FloatArray, FloatArray]:
+    """Centres (n, 2) and radii (n,), NaN where there are none."""
     geometry = np.asarray(frame.geometry.to_numpy(), dtype=object)
     xy = shapely.get_coordinates(shapely.centroid(geometry))
     radius = np.full(len(geometry), np.nan)
@@ -202,4 +200,4 @@ def _circles(frame: gpd.GeoDataFrame) -> tuple[FloatArray, FloatArray, bool]:
     else:
         area = ground_areas_m2(geometry, CRS(frame.crs))
         radius = np.where(area > 0, np.sqrt(area / np.pi), np.nan)
-    return xy, radius, bool(np.isfinite(radius).any())
+    return xy, radius

@@ -202,8 +202,6 @@ def _fit(points: FloatArray) -> Line:
     for _ in range(3 if len(points) >= _ROBUST_FROM else 0):
         offset = np.abs((points - centre) @ np.array([-direction[1], direction[0]]))
         near = offset <= max(0.75, 1.5 * float(median(offset)))
-        if near.sum() < len(points) // 2:
-            break
         centre, direction = _least_squares(points[near])
     return centre, direction
 
