@@ -72,7 +72,7 @@ def test_figures_of_what_points_say_are_as_they_are_defined():
 
 def test_certainty_is_judged_by_the_beliefs_in_outlines_like_the_one_taken():
     one = Candidate(shapely.box(0, 0, 9, 9), np.zeros((1, 1), bool), {"kept": 1.0}, 0.0)
-    belief, overlap = np.array([0.4, 0.3, 0.2, 0.1]), np.array([1.0, 0.96, 0.9, 0.5])
+    belief, overlap = np.array([0.4, 0.3, 0.2, 0.1]), np.array([1.0, 0.96, 0.9, 0.8])
     evidence = evidence_of(one, 0.5, belief, overlap)
     expected = {"kept": 1.0, "expected_overlap": 0.0, "belief_alike": 0.9, "belief_same": 0.7}
     assert evidence == pytest.approx(expected)
