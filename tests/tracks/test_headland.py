@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from shapely import box
 from shapely.affinity import rotate
 
 import geofield as gf
+from geofield.errors import TrackError
 from geofield.tracks.headland import inset
 
 
@@ -35,3 +37,26 @@ def test_a_hole_in_the_strip_cuts_the_pass_around_the_field() -> None:
     around = gf.plan_tracks(field, crs=32633, spacing_m=8, headland_m=8, direction=90)
     (whole,) = around.headland_tracks.geometry
     assert whole.difference(hole).length == pytest.approx(ring.length, abs=0.01)
+
+
+def test_rings_of_a_centimetre_are_not_united() -> None:
+    """A thousand rings around a round field took half a minute, nearly all of it for that."""
+    angles = np.linspace(0, 2 * np.pi, 200, endpoint=False)
+    far_m = 120 * (1 + 0.2 * np.cos(2 * angles) + 0.1 * np.cos(5 * angles))
+    x, y = 500_000 + far_m * np.cos(angles), 5_500_000 + far_m * np.sin(angles)
+    field, tree = shapely.Polygon(np.column_stack((x, y))), shapely.Point(500_140, 5_500_000)
+    began = time.process_time()
+    tracks = gf.plan_tracks(
+        field, [tree.buffer(3)], crs=32633, spacing_m=0.01, headland_m=10, step_m=20
+    )
+    assert time.process_time() - began < 6
+    rings = tracks.headland_tracks
+    assert rings["pass_no"].max() == 1000
+    assert rings.intersection(tree.buffer(2.99)).is_empty.all()
+
+
+def test_a_spacing_of_millions_of_pieces_is_refused() -> None:
+    """Two million were planned for a minute."""
+    field = box(500_000, 5_500_000, 500_300, 5_500_200)
+    with pytest.raises(TrackError, match="1,000,000 are the most"):
+        gf.plan_tracks(field, crs=32633, spacing_m=0.00015, step_m=100)

@@ -272,7 +272,7 @@ def test_a_spacing_that_would_fill_the_memory_is_refused_at_once(tmp_path: Path)
          "-o", str(tmp_path / "plan.gpkg")],
     )  # fmt: skip
     assert isinstance(result.exception, TrackError)
-    assert "2e+11 pieces of track; 10,000,000 are the most" in str(result.exception)
+    assert "2e+11 pieces of track; 1,000,000 are the most" in str(result.exception)
     assert not (tmp_path / "plan.gpkg").exists()
 
 
