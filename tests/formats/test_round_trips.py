@@ -22,6 +22,7 @@ from geofield.crs import LONLAT
 from geofield.errors import FormatError
 from geofield.formats import FORMATS, read_dataset, validate_file, write_dataset
 from geofield.formats.antimeridian import joined, split
+from geofield.formats.export import dropped
 from geofield.formats.names import cut_name
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
@@ -51,6 +52,15 @@ def test_same_rows_and_shapes(dataset, tmp_path, name, product, layers):
             precision_m=FORMATS[name].precision_m,
             number_tolerance=0.0 if FORMATS[name].precision_m == 0 else 1e-8,
         )
+
+
+@pytest.mark.parametrize("name", ["isoxml", "isoxml-v3", "agopengps"])
+def test_what_no_longer_knows_its_trees_is_told(dataset, tmp_path, name):
+    """They came back from ISOXML 3 and AgOpenGPS as kind `other`, without a word."""
+    write_dataset(dataset, tmp_path, [name])
+    trees = (read_dataset(tmp_path / name).table("obstacles")["kind"] == "tree").any()
+    assert (dataset.table("obstacles")["kind"] == "tree").any()
+    assert trees != ("which obstacles are trees" in dropped(dataset, FORMATS[name]))
 
 
 @pytest.mark.parametrize("name", ["isoxml", "isoxml-v3"])

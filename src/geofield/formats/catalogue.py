@@ -25,6 +25,8 @@ _TERMINAL_DROPS = (
     _OWN,
     _ORIGIN,
 )
+#: Of trees version 4 has points.
+_KIND = Drop("which obstacles are trees", "obstacles")
 
 #: A file for each layer.
 _by_layer = partial(Format, layers=_ALL, reads_folders=True, fields="joined")
@@ -218,6 +220,7 @@ CATALOGUE: tuple[Format, ...] = (
         files=("isoxml-v3/TASKDATA/TASKDATA.XML",),
         layers=("field", "obstacles", "segments"),
         writer="geofield.formats.isoxml.write:write_v3",
+        drops=(_KIND, *_TERMINAL_DROPS),
         options=("customer", "farm", "zip"),
     ),
     Format(
@@ -234,6 +237,7 @@ CATALOGUE: tuple[Format, ...] = (
             Drop("the breaks in tracks (it has whole lines)", "gaps"),
             Drop("holes in obstacles", "polygons"),
             Drop("the headland's line around all but the field's largest part", "parts"),
+            _KIND,
             *_TERMINAL_DROPS,
         ),
         precision_m=0.005,
