@@ -31,8 +31,8 @@ def products_beside(plan_file: Path) -> dict[str, list[Path]]:
     """
     found = {}
     for each in FORMATS.values():
-        files = sorted(_files(each, plan_file))
-        if files and each.name not in _NOT_RENEWED:
+        files = [] if each.name in _NOT_RENEWED else sorted(_files(each, plan_file))
+        if files:
             found[each.name] = files
     if "rdf" in found and "rdf-study" in found:
         del found["rdf" if _is_study(found["rdf"][0]) else "rdf-study"]
