@@ -43,6 +43,19 @@ class Fingers:
         self._send("touchEnd")
         time.sleep(0.5)
 
+    def pinch(self, x: float, y: float, steps: int = 6) -> None:
+        """Put a finger down and move it a little, then a second one, and move them apart."""
+        self._send("touchStart", (x, y))
+        self._send("touchMove", (x + 12, y))
+        time.sleep(0.1)
+        self._send("touchStart", (x + 12, y), (x + 50, y))
+        for step in range(1, steps + 1):
+            self._send("touchMove", (x + 12 - 8 * step, y), (x + 50 + 8 * step, y))
+            time.sleep(0.02)
+        self._send("touchEnd", (x, y))
+        self._send("touchEnd")
+        time.sleep(0.5)
+
     def tap(self, x: float, y: float) -> None:
         """Touch a spot."""
         self._send("touchStart", (x, y))
@@ -119,6 +132,33 @@ def test_corners_of_the_outline_by_fingers(page: Page) -> None:
     page.wait(lambda: len(page.state()["field"]["rings"][0]) == len(ring) - 1)
     left = {tuple(corner) for corner in page.state()["field"]["rings"][0]}
     assert tuple(moved[at]) not in left
+
+
+def test_two_fingers_zoom_whatever_tool_one_of_them_touches(page: Page) -> None:
+    """They drew an obstacle, turned the tracks, bent the outline and moved what was chosen."""
+    fingers, before = Fingers(page.driver), page.state()
+    number = before["obstacles"][10]["no"]
+    page.run(f"document.querySelector('#list [data-no=\"{number}\"]').click()")
+    page.wait(lambda: page.run("return document.querySelector('#list [aria-current=true]')"))
+    spots = [page.obstacle(number)["centre"]] * 3 + [before["field"]["rings"][0][0]]
+    for tool, spot in zip(("select", "circle", "direction", "outline"), spots, strict=True):
+        page.run(f"document.querySelector('[data-tool={tool}]').click()")
+        if tool == "outline":
+            page.driver.execute_async_script(
+                "const done = arguments[0]; import('/map.js').then(({sources, view}) =>"
+                " done(view.fit(sources.outline.getExtent(), {padding: [60, 60, 60, 60]})));"
+            )
+        nearer = page.view()[1]
+        fingers.pinch(*page.pixel(*spot))
+        assert page.view()[1] < 0.8 * nearer, tool
+        after = page.state()
+        assert not after["can_undo"], tool
+        assert after["stamp"] == before["stamp"]
+        assert page.text("message") == "", tool  # nor is one told how a circle is drawn
+    # One finger does what the tool does again.
+    at = page.pixel(*spots[-1])
+    fingers.move((at, (at[0] + 30, at[1] + 20)))
+    page.wait(lambda: page.state()["field"]["rings"] != before["field"]["rings"])
 
 
 def test_what_matters_is_seen_on_a_small_screen(page: Page) -> None:

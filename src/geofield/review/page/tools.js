@@ -4,6 +4,8 @@ import * as maps from "./map.js";
 import {preview, endPreview} from "./api.js";
 
 export const TOOLS = ["select", "circle", "polygon", "ground", "notground", "outline", "anew", "direction", "measure"];
+// What is done by a drag; the others take clicks, and two fingers between them.
+const DRAGGED = ["select", "circle", "outline", "direction"];
 let desk, touched = null, active = "select", held = [];
 // Pixels around a thing that count as the thing: fingers are wide.
 const reach = matchMedia("(pointer: coarse)").matches ? 16 : 6;
@@ -22,7 +24,13 @@ export function begin(given) {
     if (event.dragging || active !== "select") return;
     maps.map.getTargetElement().style.cursor = maps.obstacleAt(event.pixel) === null ? "" : "pointer";
   });
-  maps.map.getViewport().addEventListener("pointerdown", event => { touched = maps.map.getEventCoordinate(event); }, true);
+  maps.map.getViewport().addEventListener("pointerdown", event => {
+    if (event.isPrimary) touched = maps.map.getEventCoordinate(event);
+    // Two fingers move the map: what one of them has begun to drag goes back, until the next one touches.
+    if (!DRAGGED.includes(active)) return;
+    if (!event.isPrimary) rest();
+    else if (!held.length) use(active);
+  }, true);
   maps.view.on("change:resolution", () => maps.showHandle(desk.row(desk.chosen())));
   use("select");
 }
@@ -56,16 +64,22 @@ export const current = () => active;
 
 export function use(name) {
   active = name;
-  for (const one of held) maps.map.removeInteraction(one);
-  maps.sources.sketch.clear(true);
-  // What a hand still held goes back to where it was.
-  maps.hold(null);
-  endPreview();
-  desk.again();
+  rest();
   desk.measured("");
   held = MAKERS[name]();
   for (const one of held) maps.map.addInteraction(one);
   desk.changed();
+}
+
+// What a hand still held goes back to where it was.
+function rest() {
+  const old = held;
+  held = [];
+  for (const one of old) maps.map.removeInteraction(one);
+  maps.sources.sketch.clear(true);
+  maps.hold(null);
+  endPreview();
+  desk.again();
 }
 
 const live = command => preview(command, answer => desk.showTracks(answer, true), desk.refused);
@@ -86,7 +100,7 @@ const MAKERS = {
     const explain = () => {
       endPreview();
       desk.again();
-      if (active === "circle") desk.explain("k_add");
+      if (held.includes(draw)) desk.explain("k_add");
     };
     draw.on("drawabort", explain);
     draw.on("drawend", async ({feature}) => {
@@ -129,7 +143,7 @@ const MAKERS = {
     draw.on("drawstart", ({feature}) => feature.getGeometry().on("change", ({target}) => {
       if (target.getLength() > 2) live(command(target));
     }));
-    draw.on("drawabort", () => active === "direction" && desk.explain("k_turn"));
+    draw.on("drawabort", () => held.includes(draw) && desk.explain("k_turn"));
     draw.on("drawend", async ({feature}) => {
       await commit(command(feature.getGeometry()));
       doneWith(draw);
