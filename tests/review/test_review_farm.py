@@ -6,7 +6,7 @@ import contextlib
 import shutil
 import signal
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -189,3 +189,86 @@ def test_one_field_after_another_on_the_page(driver: webdriver.Chrome, farm: Pat
         process.wait(20)
     assert "rejected" in statuses(farm, first)
     assert not (farm / "reviewing").exists()
+
+
+def loaded_again(page: Page, work: Callable[[], object]) -> None:
+    """Do what loads the page again, and wait for it."""
+    page.run("document.body.dataset.ready = ''")
+    work()
+    page.wait(lambda: page.run("return document.body.dataset.ready") == "yes")
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+@pytest.mark.xdist_group("review")
+def test_how_the_picture_is_shown_is_kept_from_field_to_field(
+    driver: webdriver.Chrome, farm: Path
+) -> None:
+    """Near infrared was to be chosen for each field, and single keys were on again."""
+    shown = (
+        "const done = arguments[0]; import('/map.js').then(({map}) => { map.renderSync();"
+        " const layer = map.getLayers().item(0), url = layer.getSource().getTileUrlFunction();"
+        " const node = document.querySelector('#map .picture');"
+        " done([url([0, 0, 0]).split('/').slice(1, 3).join(' '), layer.getOpacity(),"
+        " getComputedStyle(node).filter, document.getElementById('keys-on').checked]); });"
+    )
+    with served(farm) as (address, _):
+        page = Page(driver, address)
+        assert driver.execute_async_script(shown) == ["colour 0", 1, "none", True]
+        page.run(
+            "for (const id of ['infrared', 'keys-on']) document.getElementById(id).click();"
+            "for (const [id, value] of [['opacity', 0.4], ['contrast', 2]]) {"
+            " const input = document.getElementById(id); input.value = value;"
+            " input.dispatchEvent(new Event('input')); }"
+        )
+        seen = ["infrared 0", 0.4, "contrast(2)", False]
+        assert driver.execute_async_script(shown) == seen
+        loaded_again(page, lambda: page.button("onward"))
+        assert driver.execute_async_script(shown) == ["infrared 1", *seen[1:]]
+        page.press("j", "r")
+        assert not page.state()["can_undo"]
+        names = [page.run(f"return document.querySelector('.ol-zoom-{way}').ariaLabel")
+                 for way in ("in", "out")]  # fmt: skip
+        assert names == ["Nearer", "Farther away"]
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+@pytest.mark.xdist_group("review")
+def test_a_tab_that_takes_over_goes_on_with_the_field_that_it_shows(
+    driver: webdriver.Chrome, farm: Path
+) -> None:
+    """It showed the other tab's field instead, and what was typed in the form was gone."""
+    typed = "return document.querySelector('[name=spacing_m]').value"
+    with served(farm) as (address, _):
+        page, first = Page(driver, address), driver.current_window_handle
+        own = page.state()["field_id"]
+        page.press("j", "r")
+        page.wait(lambda: page.judged() == 1)
+        driver.switch_to.new_window("tab")
+        other = Page(driver, address)
+        take = "document.querySelector('#message button').click()"
+        loaded_again(other, lambda: other.run(take))
+        loaded_again(other, lambda: other.button("onward"))
+        other.press("j", "c")
+        other.wait(lambda: other.judged() == 1)
+        driver.switch_to.window(first)
+        page.run(
+            "const input = document.querySelector('[name=spacing_m]'); input.value = '6';"
+            "input.dispatchEvent(new Event('input', {bubbles: true}))"
+        )
+        page.press("r")
+        page.wait(lambda: "Another tab" in page.text("message"))
+        loaded_again(page, lambda: page.run(take))
+        assert page.state()["field_id"] == own
+        assert page.judged() == 1
+        assert page.run(typed) == "6"
+        page.button("save")
+        page.wait(lambda: "Saved" in page.text("message"))
+        # What the other tab did to the other field is there as well.
+        loaded_again(page, lambda: page.button("onward"))
+        assert page.judged() == 1
+    assert "rejected" in statuses(farm, own)
+    settings = read_farm(farm)[own].settings
+    assert settings is not None
+    assert settings.tracks.spacing_m == 6

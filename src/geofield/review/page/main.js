@@ -3,6 +3,7 @@
 import * as api from "./api.js";
 import * as maps from "./map.js";
 import * as tools from "./tools.js";
+import * as view from "./view.js";
 import {legend} from "./web/symbols.js";
 import {listen, keyTable} from "./keys.js";
 import {say, speak} from "./voice.js";
@@ -35,8 +36,8 @@ function refused(error) {
   else say(error.status === 0 ? t("gone") : error.message, true);
 }
 
-// What the other tab did meanwhile is shown first; what is typed here stays.
-const takeOver = () => act(() => api.takeOver(), () => {
+// What the other tab did meanwhile to the plan that is shown here is shown first; what is typed here stays.
+const takeOver = () => act(async () => api.takeOver().then(() => api.openPlan(state.plan)), () => {
   const values = inputs().filter(input => input.value !== input.dataset.shown).map(({name, value}) => [name, value]);
   sessionStorage.setItem("typed", JSON.stringify({plan: state.plan, values}));
   again();
@@ -341,7 +342,7 @@ async function start() {
     measured: text => { $("measure").textContent = text; }, changed: pressed});
   words();
   listen(ACTIONS);
-  $("infrared-row").hidden = !state.picture?.infrared;
+  view.begin(state);
   $("credit").textContent = state.picture?.credit ?? "";
   $("directions").replaceChildren(...state.directions.map(name => new Option(name)));
   $("export-format").replaceChildren(...state.formats.map(([name, title]) => new Option(title, name)));
@@ -352,9 +353,6 @@ async function start() {
   $("plans").onchange = ({target}) => goTo(Number(target.value));
   for (const name of ["next", "previous", "confirm", "reject", "undo", "redo", "save", "help", "more", "onward"])
     $(name).onclick = () => ACTIONS[name]();
-  $("infrared").onchange = ({target}) => maps.showInfrared(target.checked, state);
-  $("opacity").oninput = ({target}) => maps.setOpacity(Number(target.value));
-  $("contrast").oninput = ({target}) => maps.setContrast(Number(target.value));
   $("language").onchange = ({target}) => { setLanguage(target.value); words(); show({}); };
   $("settings").oninput = () => { $("save").disabled = !unsaved(); };
   $("settings").onsubmit = event => {

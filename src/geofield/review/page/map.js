@@ -38,8 +38,9 @@ export function build(state, chosen) {
   // The page is the map: it moves whatever has the focus.
   const interactions = ol.interaction.defaults.defaults({onFocusOnly: false, altShiftDragRotate: false, pinchRotate: false});
   // A hand that trembles while it clicks moves nothing.
-  map = new ol.Map({target: "map", moveTolerance: 4, layers, view, interactions, controls: ol.control.defaults.defaults({rotate: false, attribution: false})
+  map = new ol.Map({target: "map", moveTolerance: 4, layers, view, interactions, controls: ol.control.defaults.defaults({rotate: false, attribution: false, zoomOptions: {zoomInTipLabel: "", zoomOutTipLabel: ""}})
     .extend([new ol.control.ScaleLine({minWidth: 90})]), keyboardEventTarget: document.getElementById("map")});
+  for (const way of ["in", "out"]) document.querySelector(`.ol-zoom-${way}`).dataset.label = `zoom_${way}`;
   // The scale bar knows no CRS of its own making: true metres on the ground come from the server.
   ol.proj.addProjection(projection);
   projection.getMetersPerUnit = () => state.scale;
@@ -67,10 +68,7 @@ export function showInfrared(on, state) {
 
 export const setOpacity = value => picture?.setOpacity(value);
 
-export function setContrast(value) {
-  const node = document.querySelector("#map .picture");
-  if (node) node.style.filter = value === 1 ? "" : `contrast(${value})`;
-}
+export const setContrast = value => map.getTargetElement().style.setProperty("--picture", `contrast(${value})`);
 
 function fill(name, features) {
   sources[name].clear(true);
