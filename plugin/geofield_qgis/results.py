@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import io
 import zipfile
 from pathlib import Path
 from typing import Any
 
 from qgis.core import (
+    QgsApplication,
     QgsLayerTreeGroup,
     QgsMapLayer,
     QgsProcessingContext,
     QgsProcessingLayerPostProcessorInterface,
     QgsProject,
     QgsRasterLayer,
+    QgsReadWriteContext,
     QgsVectorLayer,
 )
-from qgis.PyQt.QtCore import QMetaObject, Qt
+from qgis.PyQt.QtCore import QBuffer, QIODevice, QMetaObject, Qt
 from qgis.PyQt.QtXml import QDomDocument
 
 #: Kept alive until QGIS has shown the layers: it holds no reference of its own.
@@ -47,9 +50,10 @@ def entries(plan: str | Path) -> tuple[str, list[Entry]]:
     """The name of a plan and its layers from top to bottom, as its QGIS project lists them."""
     plan = Path(plan)
     project = plan.with_suffix(".qgz")
-    if not project.is_file():
+    packed = project.read_bytes() if project.is_file() else _within(plan)
+    if not packed:
         return plan.stem, []
-    with zipfile.ZipFile(project) as archive:
+    with zipfile.ZipFile(io.BytesIO(packed)) as archive:
         text = archive.read(next(n for n in archive.namelist() if n.endswith(".qgs")))
     document = QDomDocument()
     document.setContent(text.decode("utf-8"))
@@ -70,6 +74,18 @@ def entries(plan: str | Path) -> tuple[str, list[Entry]]:
             )
     title = document.elementsByTagName("title").at(0).toElement().text()
     return title or plan.stem, found
+
+
+def _within(plan: Path) -> bytes:
+    """The project that lies in the GeoPackage itself; nothing where there is none."""
+    storage = QgsApplication.projectStorageRegistry().projectStorageFromType("geopackage")
+    if not plan.is_file() or storage is None:
+        return b""
+    packed, place = QBuffer(), f"geopackage:{plan}"
+    packed.open(QIODevice.OpenModeFlag.ReadWrite)
+    for name in storage.listProjects(place)[:1]:
+        storage.readProject(f"{place}?projectName={name}", packed, QgsReadWriteContext())
+    return bytes(packed.data())
 
 
 class Placing(QgsProcessingLayerPostProcessorInterface):

@@ -377,6 +377,15 @@ def test_a_plan_that_is_shown_already_is_read_again(qgis, plan, tmp_path):
     assert after > 1.5 * before > 0
 
 
+def test_a_plan_without_its_project_beside_it_is_shown(qgis, plan, tmp_path):
+    """Of a plan whose `.qgz` was left behind nothing was loaded; one lies in the file itself."""
+    own = shutil.copytree(plan, tmp_path / "own") / "field.gpkg"
+    whole = qgis("shown", plan=str(own))
+    own.with_suffix(".qgz").unlink()
+    assert qgis("shown", plan=str(own)) == whole
+    assert {"field", "obstacles"} <= set(whole)
+
+
 def test_products_in_a_temporary_place_are_shown(qgis, sample_plan):
     """What a dialogue offers where no place is named."""
     values = {"FILES": [str(sample_plan)], "OUTPUT": "TEMPORARY_OUTPUT"}
