@@ -67,6 +67,17 @@ def test_a_zip_whose_files_lie_in_a_folder(tmp_path: Path) -> None:
     assert told.startswith("Error: none.zip holds no product"), told
 
 
+def test_a_plan_in_a_zip_is_not_planned_without_its_obstacles(tmp_path: Path, sample: Path) -> None:
+    """Its outline alone was taken: tracks ran through 21 trees, and nothing was told."""
+    with zipfile.ZipFile(tmp_path / "plan.zip", "w") as file:
+        file.write(sample / "field_1.gpkg", "field_1.gpkg")
+    code, told = tracks(tmp_path, "plan.zip")
+    assert code == 1, told
+    assert "plan.zip holds field_1.gpkg of geofield" in told
+    assert "Unpack it" in told
+    assert not (tmp_path / "plan.gpkg").exists()
+
+
 def test_of_a_recorded_round_the_next_step_is_told(tmp_path: Path) -> None:
     ring = FIELD.to_crs(4326).geometry[0].exterior.coords
     points = "".join(f'<trkpt lat="{lat}" lon="{lon}"/>' for lon, lat in ring)

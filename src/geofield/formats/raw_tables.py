@@ -18,6 +18,7 @@ import shapely
 from geofield.errors import CRSError, FormatError, MissingFileError
 from geofield.formats.catalogue import PARQUET
 from geofield.formats.foreign import refuse_layer
+from geofield.formats.gpkg_read import is_own
 from geofield.formats.registry import detect
 from geofield.formats.row_crs import refuse_other_rows
 from geofield.formats.zipped import unpacked
@@ -65,7 +66,14 @@ def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> R
         )
     if path.suffix.lower() == ".zip":
         with unpacked(path) as folder:
-            return read_raw(_only_file(path, folder, layer), layer=layer, texts=texts)
+            file = _only_file(path, folder, layer)
+            if is_own(file):
+                raise FormatError(
+                    f"{path} holds {file.name} of geofield, whose obstacles and settings are only "
+                    "read where it lies by itself.",
+                    hint="Unpack it, and give that file.",
+                )
+            return read_raw(file, layer=layer, texts=texts)
     if path.suffix.lower() in (*CSV, *PARQUET):
         refuse_layer(path, layer)
     if path.suffix.lower() in CSV:
