@@ -52,6 +52,16 @@ def test_a_log_that_cannot_be_written_is_wrong_usage(tmp_path: Path) -> None:
     assert "cannot be written" in done.stderr
 
 
+def test_a_file_that_is_no_log_is_not_written_to(tmp_path: Path) -> None:
+    plan = tmp_path / "plan.gpkg"
+    plan.write_bytes((ROOT / "sample_data" / "field_1.gpkg").read_bytes())
+    before = plan.read_bytes()
+    done = geofield("formats", "--log", plan)
+    assert done.returncode == 2
+    assert "no log of geofield" in done.stderr
+    assert plan.read_bytes() == before
+
+
 def test_the_shell_completes_commands_and_options() -> None:
     words = {"COMP_WORDS": "geofield run --spa", "COMP_CWORD": "2"}
     done = subprocess.run(

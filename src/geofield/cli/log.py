@@ -63,11 +63,19 @@ def _to_file(context: click.Context, _: click.Parameter, file: Path | None) -> N
     if file is None or context.resilient_parsing:
         return
     try:
+        if file.is_file() and not _is_log(file):
+            raise click.BadParameter(f"{file} is there, and no log of geofield: name another.")
         handler = logging.FileHandler(file, encoding="utf-8")
     except OSError as error:
         raise click.BadParameter(f"{file} cannot be written: {error.strerror}.") from None
     handler.setFormatter(_Masked("%(asctime)s %(levelname)-7s %(message)s"))
     _add(handler)
+
+
+def _is_log(file: Path) -> bool:
+    """Whether lines may be appended to a file: a plan or a table would be damaged by them."""
+    with file.open("rb") as stream:
+        return re.match(rb"\d{4}-\d\d-\d\d |$", stream.read(11)) is not None
 
 
 def _to_stderr(context: click.Context, _: click.Parameter, wanted: bool) -> None:
