@@ -220,7 +220,7 @@ def test_whole_tiles_and_areas(tmp_path: Path) -> None:
         whole = replace(HERE, whole_tiles=True)
         done = acquire(source, whole, tmp_path / "b.tif", options=FAST)
         assert done.grid.width_px % 256 == done.grid.height_px % 256 == 0
-        fit = Where(area=area, zoom="fit", frame_px=640)
+        fit = Where(area=area, zoom="fit")
         done = acquire(source, fit, tmp_path / "c.tif", options=FAST)
         assert done.source.zoom == 16
         assert done.grid.width_px == 512

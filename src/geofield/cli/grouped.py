@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from geofield.settings import Settings
+from geofield.settings import MODELS
 
 #: Shown first, in this order, by the names that commands give their parameters.
 FIRST = (
@@ -72,8 +72,7 @@ def group_of(parameter: click.Parameter) -> str:
     section, _, setting = name.partition("__")
     if not setting:
         return BELONGS.get(name, "Further")
-    model = Settings.model_fields[section].annotation
-    extra = model.model_fields[setting].json_schema_extra  # type: ignore[union-attr]
+    extra = MODELS[section].model_fields[setting].json_schema_extra
     if isinstance(extra, dict) and extra.get("study"):
         return STUDY
     return TITLES[section]

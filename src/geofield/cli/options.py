@@ -22,6 +22,7 @@ from geofield.cli.degrees import Degrees
 from geofield.cli.files import Command
 from geofield.errors import SettingsError
 from geofield.settings import (
+    MODELS,
     LonLat,
     Settings,
     Stage,
@@ -131,8 +132,7 @@ def stage_options(
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
         for section in reversed(("fetch", *sections) if imagery else sections):
-            model: Any = Settings.model_fields[section].annotation
-            for name, field in reversed(model.model_fields.items()):
+            for name, field in reversed(MODELS[section].model_fields.items()):
                 if section != "fetch" or name == "allow":
                     names, arguments = option_of(section, name, field)
                     command = click.option(*names, **arguments)(command)
@@ -174,7 +174,7 @@ def tell_idle(
     if parcel:
         reasons["field"] = "beside --boundary, whose parcel is taken as it is"
     for section, why in reasons.items():
-        fields = type(getattr(settings, section)).model_fields
+        fields = MODELS[section].model_fields
         for name in said.pop(section, {}):
             say_note(f"{option_named(name, fields[name])} changes nothing {why}.")
     for sentence in idle(settings, said):
@@ -184,7 +184,7 @@ def tell_idle(
 def _by_option(message: str, said: Mapping[str, Mapping[str, Any]]) -> str:
     """A message in which settings that were said as options have the names of these."""
     for section, values in said.items():
-        fields = Settings.model_fields[section].annotation.model_fields  # type: ignore[union-attr]
+        fields = MODELS[section].model_fields
         for name in values:
             option = option_named(name, fields[name])
             message = re.sub(rf"\b{section}\.{name}\b(\.\d+)*", option, message)

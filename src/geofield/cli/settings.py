@@ -9,7 +9,7 @@ import click
 
 from geofield.cli.console import echo_json
 from geofield.cli.options import SEPARATOR, option_of
-from geofield.settings import SECTIONS, Machine, Settings
+from geofield.settings import MODELS, Machine
 
 
 @click.command(
@@ -40,11 +40,9 @@ def settings(context: click.Context, as_json: bool) -> None:
 def all_settings() -> list[dict[str, Any]]:
     """Each setting of `geofield.settings`, plain JSON values."""
     rows = []
-    for section in SECTIONS:
-        model = Settings.model_fields[section].annotation
-        fields = model.model_fields  # type: ignore[union-attr]
-        schema = model.model_json_schema()["properties"]  # type: ignore[union-attr]
-        for name, field in fields.items():
+    for section, model in MODELS.items():
+        schema = model.model_json_schema()["properties"]
+        for name, field in model.model_fields.items():
             names, arguments = option_of(section, name, field)
             option = click.Option(names, **arguments)
             value = field.get_default()

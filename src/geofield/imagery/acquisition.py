@@ -32,6 +32,8 @@ from geofield.imagery.write import replacing, write_scene
 from geofield.model.scene import ImagerySource, Scene, outside
 from geofield.notes import warn
 
+#: Side of a square of which no other size is asked for, pixels: that of the study's pictures.
+FRAME_PX = 640
 Zoom = int | Literal["max", "fit"] | None
 
 
@@ -50,7 +52,7 @@ class Where:
         look around in it.
     zoom : int, "max", "fit" or None
         The source's zoom; its finest; the largest at which the area (or `size_m`) still fits
-        a frame of `frame_px`; None takes `resolution_m`.
+        a frame of 640 px; None takes `resolution_m`.
     resolution_m : float
         Ground resolution wanted when no zoom is given.
     whole_tiles : bool
@@ -64,7 +66,6 @@ class Where:
     area: BaseGeometry | None = None
     zoom: Zoom = None
     resolution_m: float = 0.6
-    frame_px: int = 640
     whole_tiles: bool = False
 
     def __post_init__(self) -> None:
@@ -159,7 +160,7 @@ def plan(source: Tiles, place: Where) -> tuple[Tiles, Block]:
     lat, lon = place.point
     zoom = choose_zoom(source, place)
     if isinstance(source, GoogleStaticSource):
-        size = place.size_px or place.frame_px
+        size = place.size_px or FRAME_PX
         if place.size_m is not None:
             size = round(place.size_m / pyramid.ground_resolution_m(zoom, lat=lat, lon=lon))
         return source.framed(zoom, lat=lat, lon=lon, size_px=size)
@@ -183,14 +184,14 @@ def choose_zoom(source: Tiles, place: Where) -> int:
         return pyramid.zooms[1]
     if place.zoom == "fit":
         if place.area is not None:
-            return pyramid.zoom_to_fit(place.area, place.frame_px)
+            return pyramid.zoom_to_fit(place.area, FRAME_PX)
         if place.size_m is None:
             raise ImageryError(
                 "Fitting the zoom needs a size in metres or an area.", hint="Add --size-m 400."
             )
         for level in reversed(pyramid.levels):
             resolution_m = pyramid.ground_resolution_m(level.zoom, lat=lat, lon=lon)
-            if place.size_m / resolution_m <= place.frame_px:
+            if place.size_m / resolution_m <= FRAME_PX:
                 return level.zoom
         return pyramid.zooms[0]
     if place.zoom is None:

@@ -13,11 +13,12 @@ from geofield.settings.load import as_before, from_mapping, load_settings, with_
 from geofield.settings.machines import Machine
 from geofield.settings.obstacles import ObstacleSettings
 from geofield.settings.section import LonLat
-from geofield.settings.sections import SECTIONS, Stage
+from geofield.settings.sections import MODELS, SECTIONS, Stage
 from geofield.settings.tracks import DirectionName, TrackSettings
 from geofield.settings.whole import NAMES, Settings, option_named
 
 __all__ = [
+    "MODELS",
     "NAMES",
     "SECTIONS",
     "DirectionName",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 from geofield.settings.export import ExportSettings
 from geofield.settings.field import FieldSettings
@@ -12,7 +12,7 @@ from geofield.settings.section import Section
 from geofield.settings.tracks import TrackSettings
 
 Stage = Literal["imagery", "field", "obstacles", "tracks", "export", "fetch"]
-MODELS: dict[Stage, type[Section]] = {
+MODELS: dict[str, type[Section]] = {
     "imagery": ImagerySettings,
     "field": FieldSettings,
     "obstacles": ObstacleSettings,
@@ -20,6 +20,6 @@ MODELS: dict[Stage, type[Section]] = {
     "export": ExportSettings,
     "fetch": FetchSettings,
 }
-SECTIONS: tuple[Stage, ...] = tuple(MODELS)
+SECTIONS: tuple[Stage, ...] = get_args(Stage)
 #: The section of each name: none is in two.
-HOMES: dict[str, Stage] = {name: of for of, model in MODELS.items() for name in model.model_fields}
+HOMES: dict[str, Stage] = {name: of for of in SECTIONS for name in MODELS[of].model_fields}

@@ -23,6 +23,8 @@ from geofield.tracks.shapes import FIELD, Edges, polygon_edges
 
 #: Directions tried at most before those of the shorter edges are passed over.
 _MOST_ANGLES = 600
+#: Edges are those of the area without what stands out less, units of the CRS.
+_PLAIN_M = 1.0
 
 
 def fewest_direction(
@@ -33,22 +35,20 @@ def fewest_direction(
     north_deg: float = 0.0,
     through: tuple[float, float] | None = None,
     turns: bool = False,
-    tolerance: float = 1.0,
 ) -> tuple[float, float]:
     """Find the direction, exact over the candidates, as a unit vector in the (metric) CRS.
 
     `area` is what tracks are laid in: the field without its headland. `scale` and `north_deg` are
     the CRS's there, `through` a place that a track passes. With `turns` the fewest pieces count
-    first and tracks second, instead of the other way round. `tolerance` simplifies the area before
-    its edges become candidates. Obstacles do not count: tracks stay where they are when one is
-    found or moved.
+    first and tracks second, instead of the other way round. Obstacles do not count: tracks stay
+    where they are when one is found or moved.
     """
     centre = area.centroid
     frame = TrackFrame.of((centre.x, centre.y), (1.0, 0.0), scale=scale)
     edges = polygon_edges(area, frame, FIELD)
     place = None if through is None else frame.to_frame(*through)
     best: tuple[tuple[float, float, float], tuple[float, float]] | None = None
-    for angle in candidate_angles(area, tolerance).tolist():
+    for angle in candidate_angles(area).tolist():
         # As the heading is told, 0 to 180 degrees: tracks are counted from its left.
         heading = true_heading_deg((math.cos(angle), math.sin(angle)), north_deg)
         turn = math.radians(heading - north_deg)
@@ -81,10 +81,10 @@ def fewest_tracks(area: BaseGeometry, strips: Strips, scale: float = 1.0) -> int
     return strips.count(float(np.ptp(across, axis=1).min()) / scale)
 
 
-def candidate_angles(area: BaseGeometry, tolerance: float = 1.0) -> FloatArray:
+def candidate_angles(area: BaseGeometry) -> FloatArray:
     """Directions to try, radians counter-clockwise from the CRS's x axis, 0 <= angle < pi."""
     area = shapely.normalize(area)
-    parts = shapely.get_parts([area.simplify(tolerance), area.convex_hull])
+    parts = shapely.get_parts([area.simplify(_PLAIN_M), area.convex_hull])
     rings = [ring for ring in shapely.get_exterior_ring(parts) if ring is not None]
     edges = np.concatenate([np.diff(shapely.get_coordinates(ring), axis=0) for ring in rings])
     angles = np.arctan2(edges[:, 1], edges[:, 0]) % np.pi

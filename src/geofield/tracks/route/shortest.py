@@ -23,8 +23,9 @@ from geofield.tracks.shapes import IntArray
 
 _NEIGHBOURS = 12
 _BLOCKED_FACTOR = 1.5
-_CRAMPED_RADII = 12.0
 """A link that is blocked is priced as this many times its length, until its way is known."""
+_CRAMPED_RADII = 12.0
+"""And one from or to an end at which no turn can be begun as so many turning radii more."""
 
 
 def shortest_order(
