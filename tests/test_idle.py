@@ -94,3 +94,11 @@ def test_a_region_and_another_outline_at_once(
     words = ("field", PICTURE, *POINT, "--region", 2, "-o", tmp_path / "field.gpkg")
     assert geofield(*words, *more) == 2
     assert "--region takes" in capsys.readouterr().err
+
+
+def test_a_crs_for_a_plan_that_says_its_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ("tracks", PLAN, "--spacing", 9, "-o", tmp_path / "plan.gpkg", "--crs", "EPSG:3857")
+    assert geofield(*words) == 0
+    assert "--crs changes nothing: field_1.gpkg says its own." in capsys.readouterr().err

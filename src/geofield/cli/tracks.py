@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from geofield.cli.console import echo_json, say
+from geofield.cli.console import echo_json, say, say_note
 from geofield.cli.field_notes import telling
 from geofield.cli.files import (
     OLD_PATH,
@@ -175,6 +175,9 @@ def _own_plan(file: Path, settings: Settings) -> Plan | None:
     elif record is None:
         return None
     plan = read_plan(file)
+    given = click.get_current_context().params
+    if given["crs"] is not None and given["obstacle_file"] is None:
+        say_note(f"--crs changes nothing: {file.name} says its own.")
     unread = tracks_unread(file)
     if unread is not None:
         said = settings.tracks.model_fields_set
