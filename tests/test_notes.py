@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 import warnings
 from concurrent.futures import ThreadPoolExecutor
@@ -12,6 +13,7 @@ from typing import Any
 import pytest
 
 from geofield.errors import FieldWarning, FormatWarning
+from geofield.formats import read_dataset
 from geofield.notes import listening, warn
 from geofield.review.desk import Desk
 from geofield_command import run_geofield
@@ -22,6 +24,17 @@ SAMPLE = Path(__file__).parents[1] / "sample_data" / "field_1.tif"
 def test_notes_are_warnings_of_python_where_nobody_listens() -> None:
     with pytest.warns(FieldWarning, match="a word") as heard:
         warn("a word", FieldWarning)
+    assert [Path(one.filename).name for one in heard] == ["test_notes.py"]
+
+
+def test_a_warning_names_the_line_that_called_geofield_however_deep_it_arose(
+    tmp_path: Path,
+) -> None:
+    tree = {"type": "Point", "coordinates": [33.53, 35.07]}
+    file = tmp_path / "trees.geojson"
+    file.write_text(json.dumps({"type": "Feature", "properties": {}, "geometry": tree}))
+    with pytest.warns(FormatWarning, match="no radius") as heard:
+        read_dataset(file)
     assert [Path(one.filename).name for one in heard] == ["test_notes.py"]
 
 

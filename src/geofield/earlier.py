@@ -308,7 +308,6 @@ def read_track_edits(plan: Plan) -> TrackEdits:
             f"Changed in both `tracks` and `segments`, in each another way: track {numbers}. What "
             "`segments` has of it counts; change it there again where that is not what you want.",
             TrackWarning,
-            stacklevel=3,
         )
     _warn_of_empty_columns(plan)
     return plan.track_edits
@@ -326,7 +325,6 @@ def _warn_of_empty_columns(plan: Plan) -> None:
                 f"Nothing stands in {', '.join(names)} of `{layer.name}`: an empty column of your "
                 "own goes when tracks are planned anew. Add it again and write into one row.",
                 TrackWarning,
-                stacklevel=4,
             )
 
 
@@ -336,5 +334,4 @@ def warn_of_unsearched(evidence: Evidence) -> None:
         warn(
             f"{doubt} `geofield obstacles PICTURE PLAN` searches it; then plan the tracks again.",
             ObstacleWarning,
-            stacklevel=3,
         )

@@ -7,10 +7,13 @@ belongs to the whole process, and loses them where another thread records or sil
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from traceback import walk_stack
+from types import FrameType
 
 from geofield.errors import GeofieldWarning
 
@@ -20,22 +23,22 @@ _EARS: ContextVar[tuple[tuple[list[GeofieldWarning], type[GeofieldWarning]], ...
 )
 
 
-def warn(words: str, kind: type[GeofieldWarning], *, stacklevel: int = 1) -> None:
+def warn(words: str, kind: type[GeofieldWarning]) -> None:
     """Tell something to whoever listens, else to all as a warning of Python.
 
-    Parameters
-    ----------
-    words : str
-    kind : type
-        A child of `GeofieldWarning`.
-    stacklevel : int
-        Whose line a warning of Python names, as `warnings.warn` has it: 1 is the caller's.
+    That names the line that called geofield, however deep in it the words are found.
     """
     for heard, of_kind in reversed(_EARS.get()):
         if issubclass(kind, of_kind):
             heard.append(kind(words))
             return
-    warnings.warn(words, kind, stacklevel=stacklevel + 1)
+    frames = enumerate(walk_stack(sys._getframe()), start=1)
+    ours = [level for level, (frame, _) in frames if _is_ours(frame)]
+    warnings.warn(words, kind, stacklevel=ours[-1] + 1)
+
+
+def _is_ours(frame: FrameType) -> bool:
+    return str(frame.f_globals.get("__name__")).partition(".")[0] == __package__
 
 
 @contextmanager

@@ -186,7 +186,6 @@ def run_field(
                 "The outline there was drawn by hand: it is kept, and the boundary is not used. "
                 "To have the boundary, forget the earlier plan (--fresh; in Python previous=None).",
                 FieldWarning,
-                stacklevel=2,
             )
         field = kept_outline(previous)
     else:

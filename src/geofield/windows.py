@@ -76,7 +76,7 @@ def tell_guesses(scene: Scene, *, after: Scene | None = None) -> None:
     told = () if after is None else _guesses(after)
     for guess in _guesses(scene):
         if guess not in told:
-            warn(guess, ImageryWarning, stacklevel=3)
+            warn(guess, ImageryWarning)
 
 
 def _guesses(scene: Scene) -> tuple[str, ...]:

@@ -170,7 +170,6 @@ def _tell_elsewhere(found_m: FloatArray, true_m: FloatArray) -> None:
             f"The truth lies {apart_km:,.0f} km from the obstacles: it is of another place, or its "
             "CRS is not the right one (are latitude and longitude exchanged?).",
             ObstacleWarning,
-            stacklevel=3,
         )
 
 

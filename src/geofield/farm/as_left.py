@@ -71,7 +71,7 @@ def table_in(overview: Path, of: schema.Layer, crs: CRS) -> gpd.GeoDataFrame:
     absent = int((table.geometry.isna() | table.geometry.is_empty).sum())
     if absent and of is not schema.FIELD:
         words = f"{absent} row(s) of layer {of.name!r} have no geometry, and count as deleted"
-        tell(f"{overview.name}: {words}.")
+        warn(f"{overview.name}: {words}.", FormatWarning)
     tell_lost_columns(of, table, overview)
     for name in of.column_names:
         if name not in table and of is schema.FIELD:
@@ -82,11 +82,6 @@ def table_in(overview: Path, of: schema.Layer, crs: CRS) -> gpd.GeoDataFrame:
     owner = table.get(FIELD_ID)
     table = schema.conform(of, table.assign(**{"_owner": owner}), extras=True)
     return table.assign(**{FIELD_ID: table.pop("_owner")})
-
-
-def tell(words: str) -> None:
-    """Warn of what was left and cannot be taken in."""
-    warn(words, FormatWarning, stacklevel=4)
 
 
 def obstacles_with_owners(

@@ -15,9 +15,10 @@ import shapely
 from numpy.typing import NDArray
 
 from geofield import schema
-from geofield.farm.as_left import tell
+from geofield.errors import FormatWarning
 from geofield.farm.layers import FIELD_ID
 from geofield.model.written import SAME_M, same_shapes
+from geofield.notes import warn
 from geofield.wording import counted, some_of
 
 #: What tells the rows of a field apart.
@@ -225,7 +226,8 @@ def _tell(of: schema.Layer, gone: gpd.GeoDataFrame, words: str) -> None:
     if gone.empty:
         return
     ids = sorted(set(gone[FIELD_ID].astype(str)))
-    tell(
+    warn(
         f"Layer {of.name!r}: {counted(len(gone), 'row')} of field {some_of(ids, TOLD)} "
-        f"merged into another row: {words}."
+        f"merged into another row: {words}.",
+        FormatWarning,
     )

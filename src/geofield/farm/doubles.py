@@ -69,5 +69,4 @@ def tell_double(store: Store, overview: Path, double: Sequence[str]) -> None:
             f"Field {one} was changed in the farm since {overview.name} was written, too: what "
             f"{overview.name} says holds{stays}.",
             FieldWarning,
-            stacklevel=3,
         )

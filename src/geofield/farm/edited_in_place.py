@@ -72,7 +72,7 @@ def _differs(file: Path, before: Plan, put: dict[str, Any]) -> bool:
         return _is_edited(plan, before, put)
     except GeofieldError as error:
         words = f"{file_of(field_id)} is not taken in: {error}"
-        warn(words, FieldWarning, stacklevel=3)
+        warn(words, FieldWarning)
         return False
 
 

@@ -109,7 +109,7 @@ def said_of(field_id: str) -> Iterator[None]:
     with listening() as heard:
         yield
     for each in heard:
-        warn(f"Field {field_id}, as edited: {each}", type(each), stacklevel=4)
+        warn(f"Field {field_id}, as edited: {each}", type(each))
 
 
 @contextmanager

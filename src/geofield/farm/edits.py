@@ -30,7 +30,6 @@ from geofield.farm.as_left import (
     obstacles_with_owners,
     record_in,
     table_in,
-    tell,
 )
 from geofield.farm.as_written import digests_of, own_digests, own_names, unlike, with_rest
 from geofield.farm.dissolved import TOLD, undissolved
@@ -111,10 +110,11 @@ def _edits(farm: Farm, overview: Path, taken: Mapping[str, str]) -> Edits:
     tables = {schema.FIELD: fields, schema.OBSTACLES: obstacles}
     gone = sorted(written.keys() - set(fields[FIELD_ID]))
     if gone:
-        tell(
+        warn(
             f"{overview.name}: {counted(len(gone), 'field is', 'fields are')} deleted there "
             f"({', '.join(gone[:5])}), and a "
-            "farm holds every place. Take their rows out of the places file, then --fresh."
+            "farm holds every place. Take their rows out of the places file, then --fresh.",
+            FormatWarning,
         )
     own, own_before = own_digests(tables), _own_before(overview, tables, record)
     tracks, driven = _tracks(farm, overview, fields, record, names)
@@ -194,9 +194,10 @@ def _tracks(
         bare = _bare(tables, fields, written)
     for of, some in bare.items():
         if some:
-            tell(
+            warn(
                 f"{overview.name}: no {of.name} are left of field {some_of(some, TOLD)}. No field "
-                "is left without any: they come back."
+                "is left without any: they come back.",
+                FormatWarning,
             )
     return (tables, driven) if whole else ({}, {})
 
@@ -222,9 +223,10 @@ def _own_before(
     for of, table in tables.items():
         gone = [name for name in before["columns"].get(of.name, ()) if name not in table]
         if gone:
-            tell(
+            warn(
                 f"{overview.name}: columns {', '.join(gone)} of layer {of.name!r} are gone and "
-                "come back; what else was written into columns of your own is not taken in."
+                "come back; what else was written into columns of your own is not taken in.",
+                FormatWarning,
             )
             return None
     digests: dict[str, str] = before["digests"]
@@ -271,7 +273,7 @@ def _tell_not_looked_up(store: Store, farm: Farm, edited: Mapping[str, Plan]) ->
             f"The obstacles of {file} are not looked up yet on ground that field "
             f"{', '.join(wider[:5])} gained: `geofield batch` with --fresh does that."
         )
-        warn(words, FieldWarning, stacklevel=3)
+        warn(words, FieldWarning)
 
 
 def is_edited(folder: Path, overview: Path) -> bool:

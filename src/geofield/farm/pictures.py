@@ -81,7 +81,6 @@ def pictures_of(folder: Path) -> Path | None:
             "not shown. Put its picture there, or have it planned on this one: geofield batch ... "
             "--fresh.",
             ImageryWarning,
-            stacklevel=2,
         )
     return None
 

@@ -96,7 +96,7 @@ def put_back(plan_file: Path, folder: str | Path, *, anyway: bool = False) -> st
                     if plan.tracks is None
                     else "its tracks were not those of its outline and obstacles, and"
                 )
-                warn(f"{plan.field.name}: {why} are planned again.", FieldWarning, stacklevel=2)
+                warn(f"{plan.field.name}: {why} are planned again.", FieldWarning)
             plan = run_tracks(plan, settings=settings)
         if not (whole and plan is known):
             save_plan(plan, file, overwrite=True)

@@ -91,10 +91,10 @@ def plan_fields(
     here = (_one(place, job) for place in waiting)
     for plan, why in here if client is None else _there(waiting, job, client):
         if plan is None:
-            warn(why, FieldWarning, stacklevel=2)
+            warn(why, FieldWarning)
         else:
             if why:
-                warn(f"{plan.field.name}: {why}", FieldWarning, stacklevel=2)
+                warn(f"{plan.field.name}: {why}", FieldWarning)
             yield plan
 
 

@@ -83,7 +83,7 @@ def plan_place(place: Place, job: Job, previous: Plan | None = None) -> Plan:
         place = _as_reviewed(place, previous)
         settings, said = with_said_tracks(settings, previous)
         for words in said:
-            warn(words, FieldWarning, stacklevel=2)
+            warn(words, FieldWarning)
         same = previous is reviewed and _same_stages(previous.settings, settings)
         if same and not _shown_anew(previous, place, settings, job.imagery):
             return _named(previous, place)
@@ -162,7 +162,6 @@ def _on_parcel(previous: Plan, place: Place) -> Plan:
         warn(
             f"The reviewed outline stands; that of the places differs by {apart / 10_000:.2f} ha.",
             FieldWarning,
-            stacklevel=2,
         )
     return previous
 
@@ -222,7 +221,6 @@ def _on_picture(
             warn(
                 f"Planned on {plan.source.name}, no longer on {before}: {'; '.join(plan.changes)}.",
                 FieldWarning,
-                stacklevel=2,
             )
         return plan
 
@@ -250,7 +248,7 @@ def _shown_anew(reviewed: Plan, place: Place, settings: Settings, imagery: Image
         with listening():  # told where it is planned on
             scene = open_scene(imagery.path, place.lat, place.lon, settings, outline=reviewed.field)
     except (FieldError, ImageryError, PointOutsideError) as error:
-        warn(f"It stays as reviewed: {error.message}", FieldWarning, stacklevel=3)
+        warn(f"It stays as reviewed: {error.message}", FieldWarning)
         return False
     return _is_other(scene.source, imagery, reviewed)
 
@@ -273,7 +271,7 @@ def parcel_of(place: Place) -> Field:
     outline = shapely.force_2d(reproject(shapely.from_wkb(place.outline), source, metric))
     polygon, repaired = clean_outline(outline)
     for words in repaired:
-        warn(words, FieldWarning, stacklevel=2)
+        warn(words, FieldWarning)
     return Field(
         polygon, metric, name=place.name, field_id=place.field_id, method="boundary", own=place.own
     )

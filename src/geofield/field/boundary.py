@@ -109,7 +109,6 @@ def _tell_parts(rows: gpd.GeoDataFrame, chosen: gpd.GeoDataFrame) -> None:
             f"The parcel has {count} parts: only the one with the point is taken. Each is a field "
             "of its own; `geofield batch` plans them all.",
             FieldWarning,
-            stacklevel=3,
         )
 
 
@@ -136,7 +135,6 @@ def _somewhere(rows: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
     warn(
         f"{are} of the boundary file with coordinates that are no finite numbers: left out.",
         FieldWarning,
-        stacklevel=3,
     )
     return rows[good]
 
@@ -208,7 +206,7 @@ def _field(row: gpd.GeoDataFrame, own: CRS, lat: float, lon: float, *, pointed: 
     target = metric_crs(lon, lat, own=own)
     polygon = shapely.force_2d(row.geometry.iloc[0])
     for note in datum_notes(own, *shapely.get_coordinates(polygon)[0]):
-        warn(f"The boundary: {note}", FieldWarning, stacklevel=3)
+        warn(f"The boundary: {note}", FieldWarning)
     reasons: tuple[str, ...] = ()
     if not polygon.is_valid:
         point = shapely.Point(transformer(LONLAT, own).transform(lon, lat)) if pointed else None

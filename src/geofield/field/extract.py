@@ -188,7 +188,6 @@ def extract_field(
             f"The outline of field {field.name} should be looked at before use: "
             f"{'; '.join(quality.reasons)}.",
             FieldWarning,
-            stacklevel=2,
         )
     return field
 

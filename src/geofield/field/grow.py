@@ -66,5 +66,5 @@ def grow_field(
         covered = scene.grid
         size_m = min(2 * size_m, largest_m)
     for note in heard:
-        warn(str(note), type(note), stacklevel=2)
+        warn(str(note), type(note))
     return field, scene

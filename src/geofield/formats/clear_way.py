@@ -84,7 +84,6 @@ def tell_blocked(datasets: Iterable[Dataset], *, refuse: bool) -> None:
             warn(
                 f"{each.name}: {' and '.join(blocked)}: plan the tracks again (`geofield tracks`).",
                 TrackWarning,
-                stacklevel=3,
             )
 
 

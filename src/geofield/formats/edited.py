@@ -88,7 +88,6 @@ def _driven(dataset: Dataset) -> Dataset:
             "Tracks were edited since their route was planned: it is of before. Plan it again "
             "(geofield tracks).",
             TrackWarning,
-            stacklevel=3,
         )
     tables = {**dataset.tables, **whole.tables()}
     has_points = dataset.has(schema.TRACK_POINTS.name)

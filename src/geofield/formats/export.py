@@ -129,14 +129,13 @@ def write_datasets(
         told = (dropped(one, each, together=len(datasets) > 1) for one in datasets)
         words = list(dict.fromkeys(word for one in told for word in one))
         if words:
-            warn(f"{each.title} cannot carry {_join(words)}.", FormatWarning, stacklevel=2)
+            warn(f"{each.title} cannot carry {_join(words)}.", FormatWarning)
         by_points = {"track_points", "tracks", "segments"} & set(each.layers) == {"track_points"}
         if by_points and any(one.has("tracks") and not one.has("track_points") for one in datasets):
             warn(
                 f"{each.title} has nothing of the tracks: there are none of their points, which "
                 "`geofield tracks` makes.",
                 FormatWarning,
-                stacklevel=2,
             )
     return written
 
@@ -164,7 +163,6 @@ def _tell_bare(datasets: Sequence[Dataset]) -> None:
             f"Shown without the picture, which is not beside the plan: {', '.join(bare)}. "
             "`geofield export --picture` takes it from elsewhere.",
             FormatWarning,
-            stacklevel=3,
         )
 
 

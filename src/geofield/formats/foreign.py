@@ -97,7 +97,6 @@ def _exact(frame: gpd.GeoDataFrame, path: Path, layer: str | None) -> gpd.GeoDat
             f"{path.name}: the column 'geometry' of layer {info['layer_name']!r} has the name of "
             "the shapes and is not kept: give it another name.",
             FormatWarning,
-            stacklevel=4,
         )
     names = [
         name
@@ -168,7 +167,6 @@ def _mended(path: Path, layer: str | None) -> Any:
     warn(
         f"{path.name}: geometries that are damaged: {'; '.join(words)}. Look at them.",
         FormatWarning,
-        stacklevel=4,
     )
     return frame
 
@@ -291,7 +289,7 @@ def _read(frame: gpd.GeoDataFrame, where: str, crs: CRS | None) -> gpd.GeoDataFr
     """The rows with a shape, in a CRS, as one that were cut at the 180th meridian."""
     keep = ~(frame.geometry.isna() | frame.geometry.is_empty)
     if lost := (np.flatnonzero(~keep) + 1).tolist():
-        warn(f"{where}: {without_shape(lost, 'left out')}", FormatWarning, stacklevel=4)
+        warn(f"{where}: {without_shape(lost, 'left out')}", FormatWarning)
     frame = _with_crs(frame[keep].reset_index(drop=True), where, crs)
     shapes = np.asarray(frame.geometry.to_numpy(), dtype=object)
     return frame.set_geometry(joined(shapes, CRS(frame.crs)), crs=frame.crs)
@@ -315,7 +313,6 @@ def _with_crs(frame: gpd.GeoDataFrame, where: str, crs: CRS | None) -> gpd.GeoDa
             f"{where} does not say its CRS (a Shapefile does in its .prj). Its numbers look like "
             "degrees and are read as WGS 84 longitude and latitude; name the CRS if that is wrong.",
             FormatWarning,
-            stacklevel=4,
         )
         return frame.set_crs(LONLAT)
     raise FormatError(

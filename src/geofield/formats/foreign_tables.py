@@ -138,7 +138,6 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
             f"{'it is a circle' if few == 1 else 'they are circles'} of "
             f"{POINT_RADIUS_M:g} m now. Correct them if the trees are larger.",
             FormatWarning,
-            stacklevel=2,
         )
         radius[unsized] = POINT_RADIUS_M
     wrong = (margin < 0) | np.isinf(margin)
@@ -148,7 +147,6 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
             f"{counted(int(wrong.sum()), 'safety margin is', 'safety margins are')} negative or "
             f"infinite; {'it counts' if wrong.sum() == 1 else 'they count'} as 0 m. Correct them.",
             FormatWarning,
-            stacklevel=2,
         )
     margin = np.where(wrong | np.isnan(margin), 0.0, margin)
     centre = shapely.centroid(geometry)
@@ -307,6 +305,5 @@ def _one_of(
             f"{path.name}: obstacles have a {name} that is none of {', '.join(allowed)}: "
             f"{', '.join(list(unknown)[:5])}{more}. Correct it in the layer obstacles of the plan.",
             FormatWarning,
-            stacklevel=3,
         )
     return taken

@@ -119,7 +119,6 @@ def keep_project(there: Path, new: Path) -> None:
         f"{there.name} is as it was saved in QGIS: it stays, and shows the plan as it is now. To "
         "have that of geofield anew, rename yours and repeat.",
         FormatWarning,
-        stacklevel=3,
     )
 
 

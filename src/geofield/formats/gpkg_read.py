@@ -75,7 +75,6 @@ def read(path: Path) -> Dataset:
             warn(
                 f"{path.name}: layer {name!r} is not geofield's and takes no part in the plan.",
                 FormatWarning,
-                stacklevel=2,
             )
     label = None if alone is None else alone["name"].iloc[0]
     has_points = schema.TRACK_POINTS.name in layers
@@ -166,7 +165,6 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
             f"{path.name}: {int(absent.sum())} row(s) of layer {of.name!r} have no geometry and "
             "are left out.",
             FormatWarning,
-            stacklevel=3,
         )
         frame = frame[~absent]
     _refuse_no_lines(of, frame, path)
@@ -176,7 +174,6 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
             f"{path.name}: layer 'segments' has rows of several lines: each line counts as the "
             "track on which it was written.",
             FormatWarning,
-            stacklevel=3,
         )
     if of is schema.HEADLAND_TRACKS:
         frame = _passes_by_offset(frame)
@@ -212,7 +209,6 @@ def tell_lost_columns(of: schema.Layer, frame: gpd.GeoDataFrame, path: Path) -> 
             f"{path.name}: layer {of.name!r} has no column {', '.join(lost)} any more: there each "
             "row counts as it was written, and what stands in a column of another name does not.",
             FormatWarning,
-            stacklevel=4,
         )
 
 

@@ -53,7 +53,6 @@ def read_dataset(path: Path | str, *, crs: CRS | str | None = None) -> Dataset:
             f"Of {place} all {found.title} files are read, and nothing else: "
             f"{some_of(others, 5)} must be named to be read, too.",
             FormatWarning,
-            stacklevel=2,
         )
     place = product_file(place, found)
     reader = found.load_reader()

@@ -32,7 +32,6 @@ def picture_beside(path: Path, name: str | None, source: ImagerySource) -> Path 
                 f"{scene.name} beside {path.name} is of {_dated(shown)}, the plan of "
                 f"{_dated(source)}: it is not shown. `geofield run` puts the plan's picture there.",
                 FormatWarning,
-                stacklevel=3,
             )
             return None
     return scene

@@ -113,7 +113,6 @@ def _own(series: Any) -> Column:
         warn(
             f"Shapefiles cut text at {TEXT_BYTES} bytes: column {series.name!r} has longer ones.",
             FormatWarning,
-            stacklevel=2,
         )
     return "str", [None if text is None else _cut(text) for text in texts]
 

@@ -263,7 +263,7 @@ def _repaired(frame: gpd.GeoDataFrame, path: Path, *, slivers: bool = True) -> g
         words += kept if whole else " into parts"
     sound = frame.copy()
     sound.loc[bad, sound.geometry.name] = np.array(shapes, dtype=object)
-    warn(f"{words}; look at them.", FormatWarning, stacklevel=5)
+    warn(f"{words}; look at them.", FormatWarning)
     sound = sound.explode(index_parts=False)
     spurs = sound.index.isin(frame.index[bad]) & (sound.geom_type != "Polygon")
     return sound[~spurs].reset_index(drop=True)

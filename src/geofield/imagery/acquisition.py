@@ -243,14 +243,12 @@ def _tell_nothing(source: Tiles, block: Block, missing_px: int, report: FetchRep
             f"{source.name} does not show {100 * missing_px / (width * height):.2g} % of the "
             "picture: it is transparent there, and no-data.",
             ImageryWarning,
-            stacklevel=3,
         )
     if report.alike:
         warn(
             f"{report.alike} of {report.wanted} tiles of {source.name} are the same picture: it "
             "may have nothing there, or not at this zoom. Look at the picture first.",
             ImageryWarning,
-            stacklevel=3,
         )
 
 
@@ -290,7 +288,7 @@ def _picture(
         scene = read_scene(source.path, lat=lat, lon=lon, **size, **known)
     scene = _with_provenance(scene, source)
     for guess in scene.guesses:
-        warn(guess, ImageryWarning, stacklevel=3)
+        warn(guess, ImageryWarning)
     write_scene(scene, path, overwrite=overwrite)
     return Acquired(Path(path), scene.grid, scene.source, FetchReport())
 

@@ -250,7 +250,6 @@ class TileCache:
             f"The tile cache {self.path.name} was damaged. It is set aside as {aside.name} and a "
             "new one begun; you may delete the old one.",
             ImageryWarning,
-            stacklevel=2,
         )
 
 

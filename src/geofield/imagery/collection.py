@@ -149,7 +149,7 @@ def open_collection(
     at = _reference(readers, options.point, name, told)
     reference = readers[at] = _around_point(readers[at], options.point)
     if damaged:
-        warn(told, ImageryWarning, stacklevel=2)
+        warn(told, ImageryWarning)
     unlike = [_unlike(each, reference) for each in readers]
     usable = [each for each, why in zip(readers, unlike, strict=True) if not why]
     usable.sort(key=lambda each: each is not reference)  # stable: the reference first

@@ -64,11 +64,7 @@ class PlacePicture:
             return str(self.fetch(size_m).path)
         except GeofieldError as error:
             self.offers_more = False
-            warn(
-                f"More of the picture could not be had: {error.message}",
-                ImageryWarning,
-                stacklevel=2,
-            )
+            warn(f"More of the picture could not be had: {error.message}", ImageryWarning)
             return None
 
 

@@ -46,11 +46,7 @@ def without_copies(obstacles: gpd.GeoDataFrame, record: Record) -> gpd.GeoDataFr
         numbers.iloc[group] = number
         told.setdefault(words, []).append("?" if number is None else str(int(number)))
     for words, names in told.items():
-        warn(
-            f"Rows copied in place (obstacle {', '.join(names)}): {words}.",
-            FormatWarning,
-            stacklevel=3,
-        )
+        warn(f"Rows copied in place (obstacle {', '.join(names)}): {words}.", FormatWarning)
     return obstacles.assign(obstacle_no=numbers)[stays]
 
 

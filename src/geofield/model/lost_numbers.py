@@ -82,7 +82,6 @@ def _once(of: schema.Layer, rows: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
         f"Layer {of.name!r}: {counted(int(copy.sum()), 'row is', 'rows are')} copied in place and "
         "count once.",
         FormatWarning,
-        stacklevel=4,
     )
     return rows[~copy].reset_index(drop=True)
 

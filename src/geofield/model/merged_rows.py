@@ -198,4 +198,4 @@ def _tell(rows: Iterable[WrittenRow], words: str) -> None:
 
 
 def _warn(words: str) -> None:
-    warn(f"{words}.", FormatWarning, stacklevel=5)
+    warn(f"{words}.", FormatWarning)

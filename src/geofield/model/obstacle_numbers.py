@@ -33,7 +33,6 @@ def possible_numbers(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
         f"obstacle_no {which} is no whole number from 1 to {_MOST}: such rows are known by their "
         "shapes, or get the next numbers.",
         FormatWarning,
-        stacklevel=4,
     )
     kept = pd.Series(numbers, obstacles.index).mask(strange).astype("Int64")
     return obstacles.assign(obstacle_no=kept)

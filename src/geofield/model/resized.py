@@ -144,7 +144,6 @@ def as_areas(obstacles: gpd.GeoDataFrame, record: Record) -> gpd.GeoDataFrame:
         f"The borders of obstacles became lines ({some_of(names, 20)}): each is the area that it "
         "was.",
         FormatWarning,
-        stacklevel=3,
     )
     return obstacles.set_geometry(shapes, crs=obstacles.crs)
 
@@ -167,5 +166,4 @@ def _tell_unsized(points: int, lines: int) -> None:
                 f"{many} among the obstacles without {column}: taken for {taken}. Correct the "
                 "sizes that are others.",
                 FormatWarning,
-                stacklevel=5,
             )

@@ -246,7 +246,6 @@ def _spell(rows: _Rows, known: NDArray[np.int64], before: list[WrittenRow]) -> N
                 f"{some_of(names, 1)}: {name} {said} is none of {', '.join(allowed)} and is not "
                 "used.",
                 FormatWarning,
-                stacklevel=3,
             )
         for row, old in zip(known.tolist(), before, strict=True):
             if values[row] is None:

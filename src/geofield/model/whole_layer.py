@@ -58,4 +58,4 @@ def tell_all_reshaped(
 
 
 def _warn(words: str) -> None:
-    warn(f"{words} {_NOT_MEANT}", FormatWarning, stacklevel=5)
+    warn(f"{words} {_NOT_MEANT}", FormatWarning)

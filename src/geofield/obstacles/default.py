@@ -119,7 +119,7 @@ def detect_by_default(
     if ring is not None:
         doubts += _unseen(ring.area, seen_px, gaps_px, resolution)
     for doubt in doubts:
-        warn(doubt, ObstacleWarning, stacklevel=3)
+        warn(doubt, ObstacleWarning)
     crowns = once_each(crowns, **facts["suppression"])
     p = calibrated(crowns.strength, facts["calibration"][tone.bands])
     shapes: list[shapely.Polygon] = []

@@ -152,9 +152,5 @@ def _whole_numbers(of: Layer, name: str, numbers: pd.Series[Any]) -> pd.Series[A
         strange = ~np.isnan(plain) & ~(np.abs(plain - np.round(plain)) < 1e-6)
     if strange.any():
         what = f"{name} {plain[strange][0]:g}"
-        warn(
-            f"Layer {of.name!r}: {what} is no whole number and counts as none.",
-            FormatWarning,
-            stacklevel=4,
-        )
+        warn(f"Layer {of.name!r}: {what} is no whole number and counts as none.", FormatWarning)
     return numbers.mask(strange).round().astype("Int64")

@@ -124,7 +124,7 @@ def _publish(
     _move(pairs, target, staging)
     for place, led_to in links.items():
         words = f"{place} was a link to {led_to}, which stays as it was; it is a file now."
-        warn(words, FormatWarning, stacklevel=4)
+        warn(words, FormatWarning)
     before |= seen(target, places)  # a claim may write more than once
 
 

@@ -178,4 +178,4 @@ def _of_several_kinds(geometry: NDArray[np.object_]) -> NDArray[np.bool_]:
 
 
 def _warn(message: str) -> None:
-    warn(message, TrackWarning, stacklevel=4)
+    warn(message, TrackWarning)

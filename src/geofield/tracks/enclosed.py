@@ -36,7 +36,7 @@ def tell_enclosed(tracks: Tracks) -> Tracks:
         f"{len(there)} {lie.format(length_m)} on ground that obstacles enclose: no machine gets "
         "there without crossing one."
     )
-    warn(note, TrackWarning, stacklevel=3)
+    warn(note, TrackWarning)
     return replace(tracks, notes=(*tracks.notes, note))
 
 

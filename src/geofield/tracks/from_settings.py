@@ -79,7 +79,7 @@ def plan_with_settings(
         refuse_wide_turns(bounds_m, settings.turning_radius_m, settings.margin_m)
     told = _reaching_in(settings, obstacles)
     for note in told:
-        warn(note, TrackWarning, stacklevel=2)
+        warn(note, TrackWarning)
     return replaced(tracks, notes=(*tracks.notes, *told))
 
 

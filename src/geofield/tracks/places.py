@@ -39,7 +39,7 @@ def places_across(
             f"{strips.wide_words} leaves no track in a field {far - near:.2f} m wide across the "
             "tracks; one was laid through its middle."
         )
-        warn(note, TrackWarning, stacklevel=3)
+        warn(note, TrackWarning)
         return np.array([(near + far) / 2.0]), spacing_m, (note,)
     if strips.last_strip == "spread" and len(positions) > 1:
         spacing_m = float(positions[1] - positions[0])
@@ -57,5 +57,5 @@ def _beside_note(beside_m: float) -> tuple[str, ...]:
         "Tracks that are spread evenly do not pass the place asked for (of an A-B line its A): "
         f"they lie {beside_m:.2f} m beside it."
     )
-    warn(note, TrackWarning, stacklevel=4)
+    warn(note, TrackWarning)
     return (note,)

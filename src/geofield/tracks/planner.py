@@ -165,7 +165,7 @@ def plan_tracks(
     strips = Strips(float(spacing_m), offset_m, last_strip, width_m)
     outline, notes = clean_outline(polygon)
     for note in notes:
-        warn(note, TrackWarning, stacklevel=2)
+        warn(note, TrackWarning)
     shapes = obstacle_shapes(obstacles, metric_crs, clearance_m=clearance_m, outline=outline)
     centre = outline.centroid
     scale = ground_scale(metric_crs, centre.x, centre.y)
@@ -223,7 +223,7 @@ def plan_tracks(
             holes=headland_holes,
         )
     for note in told:
-        warn(note, TrackWarning, stacklevel=2)
+        warn(note, TrackWarning)
     tracks = _tracks(
         pieces,
         crossings,

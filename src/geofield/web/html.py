@@ -168,7 +168,7 @@ def _picture(
         else:
             name = dataset.scene_path.name
             words = f"The picture {name} holds no data at {dataset.name}: the page shows none."
-            warn(words, ImageryWarning, stacklevel=3)
+            warn(words, ImageryWarning)
     if scene is None:
         return None, None
     data, kind, bounds = shown_scene(scene, dataset.crs, LONG_SIDE_PX)

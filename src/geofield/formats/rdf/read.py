@@ -117,11 +117,7 @@ def _add_siblings(graph: Graph, path: Path) -> None:
         if not fields or not theirs or fields & theirs:
             graph.merge(more)
             continue
-        warn(
-            f"{sibling.name} is of another field than {path.name}: not read.",
-            FormatWarning,
-            stacklevel=3,
-        )
+        warn(f"{sibling.name} is of another field than {path.name}: not read.", FormatWarning)
 
 
 def _metric_crs(graph: Graph) -> CRS:

@@ -98,6 +98,5 @@ def _one(kind: str, found: list[str], wanted: str | None = None) -> str | None:
             f"There are {len(found)} {kind}s ({', '.join(found)}): reading <{found[0]}>. Name "
             "another by its plan.",
             FormatWarning,
-            stacklevel=5,
         )
     return found[0] if found else None

@@ -136,7 +136,7 @@ def plan_route(
             f"{'it' if cut_off == 1 else 'them'} out."
         )
     for note in told:
-        warn(note, TrackWarning, stacklevel=2)
+        warn(note, TrackWarning)
     return replace(tracks, route=route, turns=table, notes=(*tracks.notes, *told))
 
 
