@@ -111,7 +111,10 @@ class Cluster:
                     hint="Install the same version of geofield[batch] where workers run.",
                 )
             if isinstance(facts, BaseException):
-                raise GeofieldError(f"The worker {worker} cannot be used: {facts}.")
+                raise GeofieldError(
+                    f"The worker {worker} cannot be used: {facts}.",
+                    hint="Look at what it wrote, and start it again: `dask worker ADDRESS`.",
+                )
             version, sees = facts
             if version != __version__:
                 raise GeofieldError(

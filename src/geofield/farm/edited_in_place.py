@@ -68,7 +68,10 @@ def _differs(file: Path, before: Plan, put: dict[str, Any]) -> bool:
     try:
         plan = read_plan(file)
         if plan.field.field_id != field_id:
-            raise FormatError(f"It is named {plan.field.field_id!r}, and not {field_id!r}.")
+            raise FormatError(
+                f"It is named {plan.field.field_id!r}, and not {field_id!r}.",
+                hint="Give it that field_id back, or move it out of the farm.",
+            )
         return _is_edited(plan, before, put)
     except GeofieldError as error:
         words = f"{file_of(field_id)} is not taken in: {error}"

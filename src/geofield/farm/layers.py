@@ -208,7 +208,10 @@ def epsg_of(crs: CRS) -> int | None:
 def plan_of(tables: Mapping[str, pa.Table]) -> Plan:
     """The plan of one field, from its rows by layer name, with `plan`."""
     if PLAN not in tables or tables[PLAN].num_rows != 1:
-        raise FormatError("The farm's record of this field is missing or double.")
+        raise FormatError(
+            "The farm's record of this field is missing or double.",
+            hint="Repeat `geofield batch` with --fresh: what you reviewed stays.",
+        )
     record = tables[PLAN].to_pylist()[0]
     crs = parse_crs(record["crs"])
     parsed = {name: json.loads(record[name]) for name in ("settings", "source", "evidence", "grid")}

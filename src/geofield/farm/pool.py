@@ -66,7 +66,8 @@ class Pool:
                         false_starts = 0 if worker.ready else false_starts + 1
                         if false_starts >= _FALSE_STARTS:
                             raise GeofieldError(
-                                "Workers end before they are ready: " + worker.last_words()
+                                f"Workers end before they are ready: {worker.last_words()}",
+                                hint="Is there enough memory for all? Try with --workers 1.",
                             )
                         if worker.task is not None:
                             if worker.ready:

@@ -58,7 +58,10 @@ def reviewed_plan(store: Store, field_id: str) -> Plan:
         return read_plan(store.folder / file_of(field_id))
     data = store.get(file_of(field_id))
     if data is None:
-        raise FormatError(f"The reviewed plan of {field_id} is gone from {store.shown}.")
+        raise FormatError(
+            f"The reviewed plan of {field_id} is gone from {store.shown}.",
+            hint="Bring it back from a copy; without it --retry plans the field anew.",
+        )
     with tempfile.TemporaryDirectory(prefix="geofield-") as folder:
         path = Path(folder) / "field.gpkg"
         path.write_bytes(data)

@@ -19,6 +19,7 @@ from geofield.staging import cannot_write
 
 #: What a file is called while it is written, behind a name of chance.
 _HALF = ".tmp"
+_RIGHTS = "Look at the permissions of the store, and at the key you gave it."
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class Store:
             except OSError as error:
                 raise FormatError(
                     f"{self.shown} cannot be written: {_short(error)}",
-                    hint="Look at the permissions of the store, and at the key you gave it.",
+                    hint=_RIGHTS,
                 ) from None
             return
         target = self.folder / name
@@ -115,7 +116,9 @@ class Store:
         except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
-            raise FormatError(f"{self.shown}/{name} cannot be read: {_short(error)}") from None
+            raise FormatError(
+                f"{self.shown}/{name} cannot be read: {_short(error)}", hint=_RIGHTS
+            ) from None
 
     def names(self, folder: str) -> list[str]:
         """The names in a folder, sorted; none where there is no such folder."""
@@ -130,7 +133,9 @@ class Store:
         try:
             return sorted(info.base_name for info in system.get_file_info(where))
         except OSError as error:
-            raise FormatError(f"{self.shown} cannot be read: {_short(error)}") from None
+            raise FormatError(
+                f"{self.shown} cannot be read: {_short(error)}", hint=_RIGHTS
+            ) from None
 
     def remove(self, name: str) -> None:
         """Remove a file or a folder with all that is in it; none is none."""

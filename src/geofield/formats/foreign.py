@@ -78,7 +78,10 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
     except (*_DAMAGED, DataSourceError, DataLayerError) as error:
         raise unreadable(path, error) from error
     if not isinstance(frame, gpd.GeoDataFrame):
-        raise FormatError(f"{path}: {layer or path.stem!r} is a table without geometry.")
+        raise FormatError(
+            f"{path}: {layer or path.stem!r} is a table without geometry.",
+            hint="Name a layer with shapes; positions are read from CSV with columns lat and lon.",
+        )
     return _as_filled(_exact(frame, path, layer), path)
 
 

@@ -273,7 +273,10 @@ def record_of(path: Path) -> origin.Origin | None:
     except sqlite3.OperationalError as error:
         if "no such table" in str(error):
             return None
-        raise FormatError(f"{path} cannot be read: {error}.") from error
+        raise FormatError(
+            f"{path} cannot be read: {error}.",
+            hint="May you read it, and has no other program locked it?",
+        ) from error
     except sqlite3.DatabaseError as error:
         raise FormatError(
             f"{path} is not a GeoPackage: {error}.", hint="Is the file whole?"

@@ -27,7 +27,10 @@ def to_json(dataset: Dataset) -> str:
     try:
         return json.dumps(content_of(dataset), ensure_ascii=False, indent=1)
     except (TypeError, ValueError) as error:
-        raise FormatError(f"The provenance is not plain JSON: {error}.") from error
+        raise FormatError(
+            f"The provenance is not plain JSON: {error}.",
+            hint="Settings and evidence are texts, numbers, lists and mappings.",
+        ) from error
 
 
 def content_of(dataset: Dataset) -> dict[str, Any]:

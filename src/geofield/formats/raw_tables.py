@@ -118,7 +118,8 @@ def raw_of(frame: pd.DataFrame) -> RawTable:
         table = pa.Table.from_pandas(plain, preserve_index=True).replace_schema_metadata(None)
     except (pa.ArrowException, ValueError) as error:
         raise FormatError(
-            f"{name} has a column of several kinds of values, or two of one name: {error}."
+            f"{name} has a column of several kinds of values, or two of one name: {error}.",
+            hint="Give each column a name of its own, and values of one kind.",
         ) from None
     unnamed = [each for each in table.column_names if each.startswith("__index_level_")]
     table = table.drop_columns(unnamed)
@@ -154,7 +155,7 @@ def _csv(path: Path, texts: set[str]) -> RawTable:
             ),
         )
     except OSError as error:
-        raise FormatError(f"{path} cannot be read: {error}.") from None
+        raise FormatError(f"{path} cannot be read: {error}.", hint="May you read it?") from None
     except (pa.ArrowInvalid, pa.ArrowKeyError) as error:
         if "Empty CSV" in str(error):
             raise FormatError(f"{path} is empty: it holds no rows.", hint=_ROWS) from None
@@ -164,8 +165,9 @@ def _csv(path: Path, texts: set[str]) -> RawTable:
         raise FormatError(f"{path} cannot be read: {error}.", hint=hint) from None
     if any(pa.types.is_binary(kind) for kind in table.schema.types):
         raise FormatError(f"{path} has texts that are no UTF-8.", hint=_UTF_8)
-    if len(set(names)) < len(names):
-        raise FormatError(f"{path} has two columns of the same name.")
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise FormatError(f"{path} has two columns {twice[0]!r}.", hint="Rename one of them.")
     texts_in = [name for name in names if pa.types.is_string(table.schema.field(name).type)]
     for name in texts_in:  # NA and null are missing numbers, but texts as others
         empty = pc.equal(table[name], "")

@@ -166,8 +166,11 @@ def check_limits(layer: ShapefileLayer) -> None:
     seen: set[str] = set()
     record = 1
     for column, (kind, values) in layer.columns.items():
-        if len(column.encode()) > NAME_CHARACTERS or column.lower() in seen:
-            raise FormatError(f"Shapefile {name}: the column name {column!r} is too long or twice.")
+        if column.lower() in seen:
+            raise FormatError(
+                f"Shapefile {name}: two columns are called {column!r}, but for capital letters.",
+                hint="Call that column the same in all fields.",
+            )
         seen.add(column.lower())
         longest = _longest(values) if kind == "str" else ""
         if len(longest.encode()) > TEXT_BYTES:

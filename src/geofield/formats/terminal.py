@@ -16,6 +16,7 @@ import shapely
 from numpy.typing import NDArray
 
 from geofield import schema
+from geofield.errors import FormatError
 from geofield.formats.arrow import exact_geometry
 from geofield.model import Dataset
 from geofield.model.obstacles import active
@@ -52,6 +53,23 @@ class TerminalObstacle:
 def avoided(dataset: Dataset) -> gpd.GeoDataFrame:
     """The rows of layer `obstacles` that are driven around."""
     return active(dataset.table(schema.OBSTACLES.name)).reset_index(drop=True)
+
+
+def outline_of(dataset: Dataset, program: str) -> shapely.Polygon:
+    """The one outline of a plan.
+
+    Raises
+    ------
+    FormatError
+        When there is none, or several: a `program` steers in one field.
+    """
+    field = dataset.table(schema.FIELD.name)
+    if len(field) != 1:
+        raise FormatError(
+            f"{program} needs one field; there are {len(field)}.",
+            hint="Give the plan one outline: `geofield field` finds it.",
+        )
+    return exact_geometry(schema.FIELD, field)[0]  # type: ignore[no-any-return]
 
 
 def terminal_obstacles(dataset: Dataset, field: shapely.Polygon) -> list[TerminalObstacle]:

@@ -156,7 +156,9 @@ def _fields(dataset: Dataset, place: Path) -> list[Dataset]:
             hint="Merge or delete rows of its layer `field`.",
         )
     if count > 1:
-        raise SeveralFieldsError(f"{place.name} holds {count} fields.")
+        raise SeveralFieldsError(
+            f"{place.name} holds {count} fields.", hint="Save each as a file of its own."
+        )
     return fields
 
 

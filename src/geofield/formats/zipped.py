@@ -18,6 +18,7 @@ MAX_BYTES = 4 * 2**30
 MAX_ENTRIES = 10_000
 #: An archive that unpacks to more than this, and to so many times its size, is a bomb.
 BOMB_BYTES, BOMB_RATIO = 100e6, 50
+_YOURSELF = "Unpack it yourself if you trust it."
 
 
 def archived(
@@ -64,19 +65,23 @@ def unpacked(path: Path) -> Iterator[Path]:
             entries = [entry for entry in archive.infolist() if not entry.is_dir()]
             size = sum(entry.file_size for entry in entries)
             if size > MAX_BYTES:
-                raise FormatError(f"{path} unpacks to more than {MAX_BYTES / 2**30:.0f} GB.")
+                raise FormatError(
+                    f"{path} unpacks to more than {MAX_BYTES / 2**30:.0f} GB.", hint=_YOURSELF
+                )
             if len(entries) > MAX_ENTRIES or (
                 size > BOMB_BYTES and size > BOMB_RATIO * path.stat().st_size
             ):
                 raise FormatError(
                     f"{path} unpacks to {len(entries)} files of {size / 1e6:.0f} MB, far more than "
                     "it holds: refused.",
-                    hint="Unpack it yourself if you trust it.",
+                    hint=_YOURSELF,
                 )
             for entry in entries:
                 parts = PurePosixPath(entry.filename.replace("\\", "/")).parts
                 if ".." in parts or PurePosixPath(entry.filename).is_absolute():
-                    raise FormatError(f"{path}: the entry {entry.filename!r} leads out of it.")
+                    raise FormatError(
+                        f"{path}: the entry {entry.filename!r} leads out of it.", hint=_YOURSELF
+                    )
                 if parts[0] == "__MACOSX":
                     continue
                 entry.filename = "/".join(parts)

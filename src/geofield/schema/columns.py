@@ -79,4 +79,7 @@ class Layer:
         for column in self.columns:
             if column.name == name:
                 return column
-        raise FormatError(f"Layer {self.name!r} has no column {name!r}.")
+        raise FormatError(
+            f"Layer {self.name!r} has no column {name!r}.",
+            hint=f"Columns: {', '.join(self.column_names)}.",
+        )

@@ -79,4 +79,6 @@ def cannot_write(target: Path, error: OSError) -> FormatError:
             f"{target} is not a folder ({error.strerror}).",
             hint="Choose another folder.",
         )
-    return FormatError(f"{target}: {error.strerror or error}.")
+    return FormatError(
+        f"{target}: {error.strerror or error}.", hint="Repeat, or write to another folder."
+    )

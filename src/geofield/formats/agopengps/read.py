@@ -24,6 +24,8 @@ _STRAIGHT, _PIVOT = 2, 64
 _NAMELESS = "FieldNew"
 #: What a flag of ours in a hole of the field says before its number.
 HOLE = "Hole"
+#: What helps where a file is not as the program writes it.
+_AGAIN = "Open and save the field in AgOpenGPS, then copy its whole folder again."
 _FLAG = re.compile(rf"Obstacle (\d+)|{HOLE} \d+$")
 
 
@@ -81,7 +83,7 @@ def _field(folder: Path) -> tuple[str, LocalPlane]:
     try:
         lat, lon = _numbers(lines[lines.index("StartFix") + 1])[:2]
     except (ValueError, IndexError) as error:
-        raise FormatError(f"{folder / 'Field.txt'} has no StartFix.") from error
+        raise FormatError(f"{folder / 'Field.txt'} has no StartFix.", hint=_AGAIN) from error
     after = lines.index("$FieldDir") + 1 if "$FieldDir" in lines else len(lines)
     name = lines[after] if after < len(lines) else ""
     return folder.name if name in ("", _NAMELESS) else name, LocalPlane(lat, lon)
@@ -98,7 +100,7 @@ def _flags(folder: Path, plane: LocalPlane) -> list[tuple[Any, int | None]]:
             try:
                 placed = plane.to_plane(float(parts[1]), float(parts[0]))
             except ValueError:
-                raise FormatError(f"{path}: {line[:60]!r} is no flag.") from None
+                raise FormatError(f"{path}: {line[:60]!r} is no flag.", hint=_AGAIN) from None
             number = None if match.group(1) is None else int(match.group(1))
             found.append((shapely.Point(plane.to_lonlat(*placed.T)[0]), number))
     return found
@@ -143,7 +145,9 @@ def boundary_rings(path: Path) -> Iterator[list[list[float]]]:
             yield ring
             position, number = position + 1 + count, number + 1
     except (ValueError, IndexError) as error:
-        raise FormatError(f"{path} breaks off or is damaged in ring {number}.") from error
+        raise FormatError(
+            f"{path} breaks off or is damaged in ring {number}.", hint=_AGAIN
+        ) from error
 
 
 def _lines(folder: Path) -> tuple[list[tuple[str, np.ndarray]], list[str]]:
@@ -173,7 +177,9 @@ def _lines(folder: Path) -> tuple[list[tuple[str, np.ndarray]], list[str]]:
                     told.append(f"track {name!r} taken where it was drawn, not nudged {nudge} m")
             position, number = end_row, number + 1
     except ValueError as error:
-        raise FormatError(f"{path} breaks off or is damaged in track {number}.") from error
+        raise FormatError(
+            f"{path} breaks off or is damaged in track {number}.", hint=_AGAIN
+        ) from error
     return found, told
 
 
@@ -192,4 +198,4 @@ def _text(path: Path) -> list[str]:
     try:
         return [line.strip() for line in path.read_text(encoding="utf-8-sig").splitlines()]
     except (OSError, UnicodeDecodeError) as error:
-        raise FormatError(f"{path} cannot be read: {error}.") from error
+        raise FormatError(f"{path} cannot be read: {error}.", hint=_AGAIN) from error

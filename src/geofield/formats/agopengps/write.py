@@ -12,7 +12,6 @@ import shapely
 
 from geofield import schema
 from geofield.crs import ground_areas_m2
-from geofield.errors import FormatError
 from geofield.formats.agopengps.plane import FloatArray, LocalPlane, densified, ring_headings
 from geofield.formats.agopengps.read import HOLE
 from geofield.formats.arrow import exact_geometry, to_lonlat
@@ -21,6 +20,7 @@ from geofield.formats.terminal import (
     are_bent,
     avoided,
     main_field,
+    outline_of,
     pieces_in,
     terminal_obstacles,
 )
@@ -37,10 +37,7 @@ _NAME_CHARACTERS = 60
 
 def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, Any]) -> list[Path]:
     """Write the text files of ``agopengps/Fields/<name>/``."""
-    field = dataset.table(schema.FIELD.name)
-    if len(field) != 1:
-        raise FormatError(f"AgOpenGPS needs one field; there are {len(field)}.")
-    polygon = exact_geometry(schema.FIELD, field)[0]
+    polygon = outline_of(dataset, "AgOpenGPS")
     start = to_lonlat(np.array([polygon.representative_point()], dtype=object), dataset.crs)[0]
     # The file holds the start point with seven decimals: measure from what is written.
     plane = LocalPlane(round(start.y, 7), round(start.x, 7))

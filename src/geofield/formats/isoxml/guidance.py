@@ -25,6 +25,8 @@ from geofield.formats.isoxml.codes import (
 )
 from geofield.wording import counted
 
+#: What helps where task data are not as the standard has them.
+_AGAIN = "Export the task data again from the terminal or farm program."
 #: Steps of an arc, degrees: 2 mm between arc and chord at 50 m.
 _ARC_STEP_DEG = 1.0
 #: Half the length of an A+ line where there is no field to draw it through, metres.
@@ -68,7 +70,8 @@ def position(point: ET.Element) -> tuple[float, float]:
         return float(point.get("D", "")), float(point.get("C", ""))
     except ValueError as error:
         raise FormatError(
-            f"A point's position is not two numbers: C={point.get('C')!r}, D={point.get('D')!r}."
+            f"A point's position is not two numbers: C={point.get('C')!r}, D={point.get('D')!r}.",
+            hint=_AGAIN,
         ) from error
 
 
@@ -79,7 +82,9 @@ def _number(attribute: str, text: str) -> float:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise FormatError(f"A guidance pattern (GPN) has {attribute}={text!r}, which is no number.")
+        raise FormatError(
+            f"A guidance pattern (GPN) has {attribute}={text!r}, which is no number.", hint=_AGAIN
+        )
     return number
 
 

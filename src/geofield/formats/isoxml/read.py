@@ -95,7 +95,9 @@ def task_file(path: Path) -> Path:
         for file in sorted(folder.iterdir()):
             if file.name.upper() == "TASKDATA.XML":
                 return file
-    raise FormatError(f"{path} holds no TASKDATA.XML.")
+    raise FormatError(
+        f"{path} holds no TASKDATA.XML.", hint="Name the folder TASKDATA of a terminal or stick."
+    )
 
 
 def _external(root: ET.Element, folder: Path) -> list[ET.Element]:
@@ -106,7 +108,10 @@ def _external(root: ET.Element, folder: Path) -> list[ET.Element]:
         if name.startswith("PFD"):
             matching = [file for file in folder.iterdir() if file.name.upper() == name.upper()]
             if not matching:
-                raise FormatError(f"{folder} lacks {name}, to which TASKDATA.XML refers.")
+                raise FormatError(
+                    f"{folder} lacks {name}, to which TASKDATA.XML refers.",
+                    hint="Copy the whole folder TASKDATA: its files belong together.",
+                )
             fields += list(read_xml(matching[0]).iter("PFD"))
     return fields
 

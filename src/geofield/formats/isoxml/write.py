@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from geofield import schema
 from geofield.crs import GEOD, ground_areas_m2, ground_scale_of
 from geofield.errors import FormatError, refuse_unknown
-from geofield.formats.arrow import exact_geometry, to_lonlat
+from geofield.formats.arrow import to_lonlat
 from geofield.formats.isoxml.codes import (
     DECIMALS,
     DESIGNATOR,
@@ -36,7 +36,7 @@ from geofield.formats.isoxml.codes import (
 )
 from geofield.formats.many import last_imagery_day, owner_of
 from geofield.formats.names import cut_name, line_names
-from geofield.formats.terminal import are_bent, main_field, terminal_obstacles
+from geofield.formats.terminal import are_bent, main_field, outline_of, terminal_obstacles
 from geofield.formats.xml import node, write_xml
 from geofield.formats.zipped import archived
 from geofield.model import Dataset
@@ -99,10 +99,7 @@ def _task_data(datasets: Sequence[Dataset], version: int, options: Mapping[str, 
         ET.SubElement(root, "FRM", A=own, B=cut_name(farm, DESIGNATOR), I=customers[customer])
     groups = itertools.count(1)
     for place, (dataset, owner) in enumerate(zip(datasets, owners, strict=True), start=1):
-        field = dataset.table(schema.FIELD.name)
-        if len(field) != 1:
-            raise FormatError(f"ISOXML needs one field; there are {len(field)}.")
-        polygon = exact_geometry(schema.FIELD, field)[0]
+        polygon = outline_of(dataset, "ISOXML")
         part = ET.SubElement(
             root,
             "PFD",

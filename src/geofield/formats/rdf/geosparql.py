@@ -27,6 +27,7 @@ from geofield.formats.rdf.namespaces import BOOLEAN, CRS84, DOUBLE, EPSG, GEOF, 
 
 #: Units of measure that `geof:distance` and `geof:buffer` take.
 METRE_IRIS = ("http://www.opengis.net/def/uom/OGC/1.0/metre", expand("unit:M"))
+_CORRECT = "Correct its geo:asWKT."
 
 Value = str | float | bool | None
 
@@ -60,7 +61,9 @@ def geometry_of(text: str, subject: str) -> tuple[Any, CRS]:
     try:
         return _shapes(iri, wkt)
     except ShapelyError as error:
-        raise FormatError(f"<{subject}>: {wkt[:60]!r} is not WKT ({error}).") from error
+        raise FormatError(
+            f"<{subject}>: {wkt[:60]!r} is not WKT ({error}).", hint=_CORRECT
+        ) from error
     except FormatError as error:
         raise FormatError(f"<{subject}>: {error.message}", hint=error.hint) from error
 
@@ -70,7 +73,7 @@ def _shapes(iri: str, wkt: Any) -> tuple[Any, CRS]:
     shapes = shapely.from_wkt(wkt)
     crs = known_crs(iri)
     if not np.isfinite(shapely.get_coordinates(shapes)).all():
-        raise FormatError("a coordinate is not a finite number.")
+        raise FormatError("a coordinate is not a finite number.", hint=_CORRECT)
     return in_order(shapes, crs), crs
 
 
@@ -106,7 +109,7 @@ def geometries_of(
         words = (
             "geometry is empty" if result[row].is_empty else "coordinates are not a place on earth"
         )
-        raise FormatError(f"<{subjects[row]}>: its {words}.")
+        raise FormatError(f"<{subjects[row]}>: its {words}.", hint=_CORRECT)
     return result
 
 

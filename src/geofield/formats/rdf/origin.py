@@ -16,6 +16,8 @@ from geofield.grid import Grid
 from geofield.model.dataset import Provenance
 from geofield.model.scene import ImagerySource
 
+_ANEW = "Export the plan anew, or take that statement out of the file."
+
 
 def read_provenance(graph: Graph, scope: Scope) -> Provenance:
     """Software, picture, settings and evidence of the run behind the survey and plan meant."""
@@ -41,7 +43,9 @@ def read_grid(graph: Graph, scope: Scope) -> Grid | None:
     try:
         return Grid(int(width), int(height), Affine(*map(float, transform.split())), parse_crs(crs))
     except (ValueError, TypeError) as error:
-        raise FormatError(f"<{picture}>: its grid cannot be understood ({error}).") from error
+        raise FormatError(
+            f"<{picture}>: its grid cannot be understood ({error}).", hint=_ANEW
+        ) from error
 
 
 def read_scene_name(graph: Graph, scope: Scope) -> str | None:
@@ -82,5 +86,7 @@ def _json(graph: Graph, subject: str | None, predicate: str, default: Any) -> An
     try:
         value = json.loads(text)
     except ValueError as error:
-        raise FormatError(f"<{subject}>: <{predicate}> is not JSON ({error}).") from error
+        raise FormatError(
+            f"<{subject}>: <{predicate}> is not JSON ({error}).", hint=_ANEW
+        ) from error
     return value if isinstance(value, type(default)) else default

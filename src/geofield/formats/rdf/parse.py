@@ -57,7 +57,9 @@ def parse(path: Path) -> Iterator[ox.Quad]:
             f"{path.name}{line}: {error.msg}.", hint="The file is not valid RDF in its syntax."
         ) from error
     except (OSError, ValueError) as error:
-        raise FormatError(f"{path.name} cannot be read: {error}.") from error
+        raise FormatError(
+            f"{path.name} cannot be read: {error}.", hint="Is it whole, and may you read it?"
+        ) from error
 
 
 @dataclass(frozen=True, order=True, slots=True)

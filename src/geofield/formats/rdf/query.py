@@ -126,9 +126,14 @@ def ask(store: ox.Store, query: Query | str, values: Mapping[str, str] | None = 
         columns = tuple(variable.value for variable in result.variables)
         rows = tuple(tuple(_python(row[column]) for column in columns) for row in result)
     except (SyntaxError, ValueError) as error:
-        raise FormatError(f"The query is not valid SPARQL: {error}.") from error
+        raise FormatError(
+            f"The query is not valid SPARQL: {error}.",
+            hint="Begin with one that comes along: `geofield query --list`.",
+        ) from error
     except (RuntimeError, OSError) as error:
-        raise FormatError(f"The query cannot be answered: {error}.") from error
+        raise FormatError(
+            f"The query cannot be answered: {error}.", hint="Ask for less at a time."
+        ) from error
     return Answer(columns, rows)
 
 
@@ -149,7 +154,10 @@ def _literal(match: re.Match[str], value: str) -> str:
         if kind == "double":
             return f'"{float(value)!r}"^^xsd:double'
     except ValueError as error:
-        raise FormatError(f"{match['name']} is {value!r}, not a number.") from error
+        raise FormatError(
+            f"{match['name']} is {value!r}, not a number.",
+            hint="Write it like 12, without a unit.",
+        ) from error
     # The engine's own writing of the text: no value breaks out of its literal.
     return str(ox.Literal(value))
 

@@ -49,9 +49,8 @@ def read(path: Path, *, plan: str | None = None) -> Dataset:
     Parameters
     ----------
     path : Path
-        ``.rdf``, ``.ttl``, ``.jsonld``, ``.nt``, or a folder with ``field.rdf`` in it. The
-        files ``field.rdf``, ``obstacles.rdf`` and ``tracks.rdf`` of one field are read
-        together whichever is named.
+        ``.rdf``, ``.ttl``, ``.jsonld`` or ``.nt``. The files ``field.rdf``, ``obstacles.rdf`` and
+        ``tracks.rdf`` of one field are read together whichever is named.
     plan : str, optional
         Which track plan, where the file holds several: the end of its IRI. The field's own
         when not given.
@@ -61,9 +60,6 @@ def read(path: Path, *, plan: str | None = None) -> Dataset:
     FormatError
         When the file is hostile, not valid, holds several fields, or nothing of a field.
     """
-    path = Path(path)
-    if path.is_dir():
-        path = path / "field.rdf"
     graph = load(path)
     _add_siblings(graph, path)
     dataset = from_graph(graph, plan=plan, path=path)
@@ -278,7 +274,8 @@ class _Rows:
         for index in np.flatnonzero(shapely.get_type_id(geometry) != TYPE_IDS[of.geometry])[:1]:
             raise FormatError(
                 f"<{self.subjects[index]}> is a {geometry[index].geom_type}; the layer "
-                f"{of.name!r} holds geometries of type {of.geometry}."
+                f"{of.name!r} holds geometries of type {of.geometry}.",
+                hint="Correct its geo:asWKT, or its class.",
             )
         return geometry
 
