@@ -799,7 +799,7 @@ def test_what_is_no_word_is_told(folder: Path) -> None:
 
     _edit(folder, "obstacles", shapeless)
     said = " ".join(_batch(folder).split())
-    assert "1 row(s) of layer 'obstacles' have no geometry, and count as deleted" in said
+    assert "layer 'obstacles': 1 row has no shape and is counted as deleted: row " in said
     assert list(gf.read_farm(folder / "farm")["b"].obstacles["obstacle_no"]) == [4]
 
 

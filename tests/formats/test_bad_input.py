@@ -146,6 +146,18 @@ def test_terminals_need_one_field(dataset, tmp_path, name):
         write_dataset(none, tmp_path, [name])
 
 
+def test_rows_that_lost_their_shape_are_told_by_number(dataset, tmp_path):
+    write_dataset(dataset, tmp_path, ["gpkg"])
+    file = tmp_path / "field.gpkg"
+    obstacles = pyogrio.read_dataframe(file, layer="obstacles")
+    obstacles.loc[1, "geometry"] = None
+    pyogrio.write_dataframe(obstacles, file, layer="obstacles")
+    with pytest.warns(
+        FormatWarning, match="'obstacles': 1 row has no shape and is left out: row 2"
+    ):
+        assert len(read_dataset(file).table("obstacles")) == len(obstacles) - 1
+
+
 def test_a_reprojected_layer_is_told(dataset, tmp_path):
     write_dataset(dataset, tmp_path, ["gpkg"])
     path = tmp_path / "field.gpkg"

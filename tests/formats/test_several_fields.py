@@ -311,7 +311,7 @@ def test_a_row_of_none_of_the_fields_is_not_left_out_silently(tmp_path):
     pyogrio.write_dataframe(obstacles, file, layer="obstacles")
     done = geofield("export", file, "-f", "isoxml", "--out", tmp_path / "out")
     assert done.returncode == 1
-    assert "'obstacles' has 1 row(s) of none of the 2 fields" in done.stderr
+    assert "'obstacles' has 1 row of none of the 2 fields" in done.stderr
 
 
 def test_each_field_of_a_set_of_shapefiles_has_its_own_tracks(tmp_path):

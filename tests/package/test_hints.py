@@ -22,11 +22,12 @@ FIELD = "2026-11-29\n$FieldDir\nNorth\n$Offsets\n0,0\nStartFix\n52.1,8.2\n"
 def without_hint(tree: ast.Module) -> Iterator[int]:
     """The lines on which an error of geofield is made that has a message alone."""
     for node in ast.walk(tree):
-        if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
+        if not isinstance(node, ast.Call) or any(each.arg == "hint" for each in node.keywords):
             continue
-        kind: Any = getattr(errors, node.func.id, None)
-        is_ours = isinstance(kind, type) and issubclass(kind, errors.GeofieldError)
-        if is_ours and not any(each.arg == "hint" for each in node.keywords):
+        # One of two kinds, perhaps, as the case may be.
+        names = (part.id for part in ast.walk(node.func) if isinstance(part, ast.Name))
+        kinds: list[Any] = [getattr(errors, name, None) for name in names]
+        if any(isinstance(one, type) and issubclass(one, errors.GeofieldError) for one in kinds):
             yield node.lineno
 
 
@@ -49,6 +50,11 @@ def test_every_error_has_a_hint(room: str) -> None:
             "breaks off or is damaged in ring 1",
             "copy its whole folder again",
         ),
+        (
+            {"TASKDATA/TASKDATA.XML": '<ISO11783_TaskData VersionMajor="4"/>'},
+            "holds no field (PFD)",
+            "Export the field with the task data",
+        ),
         ({"trees.csv": "lat,lon,kind,kind\n52,8,a,b\n"}, "two columns 'kind'", "Rename one"),
         (
             {"TASKDATA/TASKDATA.XML": '<ISO11783_TaskData><XFR A="PFD00001"/></ISO11783_TaskData>'},
@@ -56,7 +62,7 @@ def test_every_error_has_a_hint(room: str) -> None:
             "Copy the whole folder TASKDATA",
         ),
     ],
-    ids=["no start", "half a ring", "columns alike", "half of the task data"],
+    ids=["no start", "half a ring", "no field", "columns alike", "half of the task data"],
 )
 def test_a_damaged_file_is_told_with_what_helps(
     tmp_path: Path, files: dict[str, str], words: str, hint: str

@@ -17,6 +17,7 @@ from geofield.farm.layers import FIELD_ID
 from geofield.formats import origin
 from geofield.formats.gpkg_read import in_own_terms, record_of, tell_lost_columns
 from geofield.notes import warn
+from geofield.wording import without_shape
 
 #: Where the overview keeps the digests, in its evidence.
 DIGESTS = "fields_as_written"
@@ -68,10 +69,10 @@ def table_in(overview: Path, of: schema.Layer, crs: CRS) -> gpd.GeoDataFrame:
             hint=f"Give it its name back, or move the file out of the farm: {_ANEW}",
         ) from error
     table = in_own_terms(of, table, crs, overview)
-    absent = int((table.geometry.isna() | table.geometry.is_empty).sum())
+    absent = (np.flatnonzero(table.geometry.isna() | table.geometry.is_empty) + 1).tolist()
     if absent and of is not schema.FIELD:
-        words = f"{absent} row(s) of layer {of.name!r} have no geometry, and count as deleted"
-        warn(f"{overview.name}: {words}.", FormatWarning)
+        told = without_shape(absent, "counted as deleted")
+        warn(f"{overview.name}: layer {of.name!r}: {told}", FormatWarning)
     tell_lost_columns(of, table, overview)
     for name in of.column_names:
         if name not in table and of is schema.FIELD:

@@ -243,7 +243,9 @@ def read_foreign(
     present = [RawLayer(name, frame) for name, frame in read if len(frame)]
     if not present:
         rows = sum(len(each.frame) for each in layers)
-        raise (FormatError if rows else EmptyFileError)(f"{path} holds no geometries.")
+        raise (FormatError if rows else EmptyFileError)(
+            f"{path} holds no geometries.", hint="Open it in QGIS: were its shapes saved?"
+        )
     metric = _metric_of(present)
     own: dict[str, list[Any]] = {}
     foreign: list[RawLayer] = []

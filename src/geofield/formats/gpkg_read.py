@@ -24,7 +24,7 @@ from geofield.model.merged_rows import parts_apart
 from geofield.model.scene import ImagerySource
 from geofield.notes import warn
 from geofield.strangers import database, is_geopackage
-from geofield.wording import counted
+from geofield.wording import counted, without_shape
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -161,11 +161,8 @@ def _own_table(of: schema.Layer, frame: gpd.GeoDataFrame, crs: CRS, path: Path) 
     frame = in_own_terms(of, frame, crs, path)
     absent = frame.geometry.isna() | frame.geometry.is_empty
     if absent.any():
-        warn(
-            f"{path.name}: {int(absent.sum())} row(s) of layer {of.name!r} have no geometry and "
-            "are left out.",
-            FormatWarning,
-        )
+        told = without_shape((np.flatnonzero(absent) + 1).tolist(), "left out")
+        warn(f"{path.name}: layer {of.name!r}: {told}", FormatWarning)
         frame = frame[~absent]
     _refuse_no_lines(of, frame, path)
     tell_lost_columns(of, frame, path)

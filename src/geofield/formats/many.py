@@ -21,7 +21,7 @@ from geofield.formats.antimeridian import seamless
 from geofield.formats.names import safe_name
 from geofield.model import Dataset, Provenance
 from geofield.model.lost_numbers import numbered
-from geofield.wording import unlike
+from geofield.wording import counted, unlike
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -73,9 +73,9 @@ def field_ids(datasets: Sequence[Dataset]) -> list[str]:
     for each in datasets:
         table = each.table(schema.FIELD.name)
         if len(table) != 1 or pd.isna(table[FIELD_ID].iloc[0]):
+            what = counted(len(table), "field without an id", "fields")
             raise FormatError(
-                f"{each.name} has {len(table)} fields"
-                + ("." if len(table) != 1 else " without an id."),
+                f"{each.name} has {what}.",
                 hint="Each plan needs one outline with a field_id.",
             )
         found.append(str(table[FIELD_ID].iloc[0]))
@@ -150,7 +150,7 @@ def apart(dataset: Dataset) -> list[Dataset]:
         strange = int((~table[FIELD_ID].isin(ids)).sum())
         if strange:
             raise FormatError(
-                f"Layer {name!r} has {strange} row(s) of none of the {len(ids)} fields.",
+                f"Layer {name!r} has {counted(strange, 'row')} of none of the {len(ids)} fields.",
                 hint="Give each row the field_id of its field.",
             )
     return [_one_of(dataset, tables, row) for row in fields.to_dict("records")]

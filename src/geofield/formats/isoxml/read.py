@@ -46,9 +46,13 @@ def read(path: Path) -> Dataset:
     """
     file, fields = _fields(path)
     if len(fields) != 1:
+        if not fields:
+            raise FormatError(
+                f"{file} holds no field (PFD).",
+                hint="Export the field with the task data from the terminal or farm program.",
+            )
         names = ", ".join(str(field.get("C")) for field in fields[:5])
-        kind = SeveralFieldsError if fields else FormatError
-        raise kind(
+        raise SeveralFieldsError(
             f"{file} holds {len(fields)} fields ({names}); a dataset is one field.",
             hint="Export the one you want from the terminal or farm program alone.",
         )
