@@ -373,6 +373,43 @@ def test_a_name_that_the_system_or_libraries_refuse(name: str, code: int, told: 
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
+@pytest.mark.parametrize("line", ["info field.gpkg", "import field.gpkg -o new.gpkg"])
+def test_a_link_that_leads_to_itself(tmp_path: Path, line: str) -> None:
+    (tmp_path / "field.gpkg").symlink_to("field.gpkg")
+    done = run_geofield(*line.split(), folder=tmp_path)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    "line", ["tiles {} --lat 35 --lon 33 -o t.tif", "obstacles {} PLAN -o o.gpkg"]
+)
+def test_an_address_that_is_none(sample: Path, tmp_path: Path, line: str) -> None:
+    words = line.replace("PLAN", str(sample / "field_1.gpkg")).format("http://[host").split()
+    done = run_geofield(*words, folder=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.startswith("Error: http://[host is no address: ")
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("boundary", "hint"),
+    [
+        (".", "It is a folder: name a file in it."),
+        ("field_1.tif", "Give the picture to `geofield run`"),
+        ("field_1.gpkg --boundary-layer none", "name one with --boundary-layer."),
+    ],
+)
+def test_what_is_wrong_with_a_boundary_is_told_with_its_own_next_step(
+    sample: Path, tmp_path: Path, boundary: str, hint: str
+) -> None:
+    line = f"run field_1.tif --boundary {boundary} --out {tmp_path / 'out'}"
+    done = run_geofield(*line.split(), folder=sample)
+    assert done.returncode == 1
+    assert hint in done.stderr
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no folder is removed there while in use")
 def test_a_folder_that_is_gone_is_told(tmp_path: Path) -> None:
     (tmp_path / "gone").mkdir()

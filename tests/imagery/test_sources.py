@@ -796,6 +796,12 @@ def test_an_index_that_was_cut_off(tmp_path: Path) -> None:
         read_scene(index)
 
 
+def test_a_picture_that_is_called_like_an_index(tmp_path: Path, sample: Path) -> None:
+    named = tmp_path / "picture.gpkg"
+    named.write_bytes((sample / "field_1.tif").read_bytes())
+    assert np.array_equal(read_scene(named).bands, read_scene(sample / "field_1.tif").bands)
+
+
 def test_stac_items(tmp_path: Path) -> None:
     values = ground(100, 100, 4)
     write(tmp_path / "data.tif", values, photometric="MINISBLACK")

@@ -36,7 +36,10 @@ class NamedPath(click.Path):
             return Path(value)
         path = super().convert(value, param, ctx)
         if isinstance(path, Path) and path.suffix.lower() == ".gpkg" and path.is_symlink():
-            return path.resolve()
+            try:
+                return path.resolve()
+            except (OSError, RuntimeError):
+                self.fail(f"{path} is a link that leads back to itself.", param, ctx)
         return path
 
 

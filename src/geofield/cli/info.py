@@ -44,10 +44,10 @@ def info(file: Path, crs: str | None, as_json: bool) -> None:
 def _facts(file: Path, crs: str | None) -> dict[str, Any]:
     """What a file holds; one of no vector format that is known may be a picture of any kind."""
     from geofield.formats import detect
-    from geofield.imagery.pictures import holds_tiles
+    from geofield.imagery.pictures import is_picture
 
     inner = picture_file(file) != file
-    if inner or file.suffix.lower() in (".tif", ".tiff") or holds_tiles(file):
+    if inner or file.suffix.lower() in (".tif", ".tiff") or is_picture(file):
         return _picture(file)
     try:
         title = detect(file).title

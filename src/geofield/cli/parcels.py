@@ -71,8 +71,9 @@ def parcel_and_point(
         table = read_vector(path, layer) if in_layers else read_table(path, layer)
     except FormatError as error:
         of_layers = "`ogrinfo` shows the layers of a file; name one with --boundary-layer."
+        of_file = alone or (layer is None and error.hint)
         raise FieldError(
-            f"The boundary: {error.message}", hint=error.hint if alone else of_layers
+            f"The boundary: {error.message}", hint=error.hint if of_file else of_layers
         ) from None
     if table.crs is not None:
         whole = joined(table.geometry.to_numpy(), parse_crs(table.crs))

@@ -142,8 +142,7 @@ def read_parquet(path: Path) -> gpd.GeoDataFrame:
         if frame.crs is not None:  # only now is it looked at
             parse_crs(frame.crs)
     except (pa.ArrowInvalid, ValueError, OSError, ProjError) as error:
-        reason = f"{error}"[:200]
-        raise FormatError(f"{path} cannot be read: {reason}.", hint="Is it whole?") from error
+        raise unreadable(path, error) from error
     return frame.drop(columns="bbox", errors="ignore")
 
 

@@ -18,7 +18,7 @@ from geofield import __version__
 from geofield.crs import parse_crs
 from geofield.errors import CRSError, ImageryError, MissingFileError
 from geofield.imagery.damage import made_up
-from geofield.imagery.reach import OWN_FOLDER, Reach
+from geofield.imagery.reach import OWN_FOLDER, Reach, refuse_no_address
 from geofield.imagery.vrt import check_beside, check_vrt
 from geofield.strangers import picture_file
 
@@ -105,6 +105,7 @@ def open_picture(path: str, reach: Reach = OWN_FOLDER, *, placed: bool = False) 
         No such file, not a picture, truncated, or the server does not answer.
     """
     name = display_name(path)
+    refuse_no_address(path)
     if not is_remote(path) and not path.startswith(("/vsi", "<")) and "://" not in path:
         file = picture_file(path)
         if not file.exists():

@@ -18,7 +18,7 @@ from geofield.imagery.reach import Reach
 from geofield.imagery.reader import SceneReader
 from geofield.imagery.stac import is_stac, open_stac
 from geofield.imagery.tags import source_from_tags
-from geofield.strangers import check_vector, database
+from geofield.strangers import PICTURES, check_vector, database
 
 _PICTURES = frozenset({".tif", ".tiff", ".vrt", ".jp2", ".img", ".png", ".jpg", ".jpeg", ".webp"})
 _INDEXES = frozenset({".gpkg", ".shp", ".fgb", ".geojson"})
@@ -85,7 +85,7 @@ def _several(file: Path, reach: Reach) -> list[str]:
     """The pictures of a folder or a tile index; empty for what is a picture itself."""
     if file.is_dir():
         return pictures_in(file)
-    if file.suffix.lower() in _INDEXES and file.is_file() and not holds_tiles(file):
+    if file.suffix.lower() in _INDEXES and file.is_file() and not is_picture(file):
         located = pictures_of_index(file)
         for each in located:
             reach.of(file).require(each, file.name)
@@ -108,8 +108,12 @@ def pictures_in(folder: Path) -> list[str]:
     return found
 
 
-def holds_tiles(file: Path) -> bool:
-    """Whether a GeoPackage is a picture itself, as QGIS and GDAL write them, not an index."""
+def is_picture(file: Path) -> bool:
+    """Whether a file is a picture, whatever it is called; so are GeoPackages with tiles."""
+    if file.is_file():
+        with file.open("rb") as stream:
+            if stream.read(16).startswith(PICTURES):
+                return True
     if file.suffix.lower() != ".gpkg":
         return False
     asked = "SELECT 1 FROM gpkg_contents WHERE data_type IN ('tiles', '2d-gridded-coverage')"

@@ -62,6 +62,18 @@ class Reach:
                 yield place if place.is_dir() else place.parent
 
 
+def refuse_no_address(text: str) -> None:
+    """Refuse what is written like an address of the web, and is none."""
+    try:
+        urlsplit(text)
+    except ValueError as error:
+        # Behind it may stand a key, before it a password.
+        server = text.partition("?")[0].rpartition("@")[2]
+        raise ImageryError(
+            f"{server} is no address: {error}.", hint="Write it like https://host/path."
+        ) from None
+
+
 def _host(address: str) -> tuple[str, int] | None:
     """Host name and port of a web address; None for anything else."""
     try:

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 from geofield.errors import ImageryError, MissingFileError
 from geofield.imagery.client import Client
 from geofield.imagery.gdal import display_name
-from geofield.imagery.reach import Reach
+from geofield.imagery.reach import Reach, refuse_no_address
 from geofield.imagery.sources.base import PictureSource, Source
 from geofield.imagery.sources.catalogue import BUILTIN, SourceEntry
 from geofield.imagery.sources.google import GoogleStaticSource
@@ -76,6 +76,7 @@ def find_source(
         Nothing of that name; the nearest one is suggested.
     """
     catalogue = BUILTIN if catalogue is None else catalogue
+    refuse_no_address(catalogue[what].address if what in catalogue else what)
     if what in catalogue:
         name, entry = what, catalogue[what]
     else:
