@@ -373,6 +373,33 @@ def test_a_name_that_the_system_or_libraries_refuse(name: str, code: int, told: 
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("option", "code", "told"),
+    [
+        ("--crs hello", 1, "Unknown coordinate reference system 'hello'."),
+        ("--bands=", 2, "--bands: it is empty: leave it out, or name one"),
+        ("--format=", 2, "--format: it is empty: leave it out, or name one"),
+    ],
+)
+def test_what_is_mistyped_is_refused_though_the_picture_says_it_itself(
+    sample: Path, tmp_path: Path, option: str, code: int, told: str
+) -> None:
+    """An empty --bands took all bands for ground of any kind: 3.73 ha instead of 3.65."""
+    line = f"run field_1.tif --lat 35.075373 --lon 33.531142 --out {tmp_path / 'o'} {option}"
+    done = run_geofield(*line.split(), folder=sample)
+    assert done.returncode == code
+    assert told in done.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no file is called so there")
+def test_a_folder_below_a_file(sample: Path) -> None:
+    line = "field field_1.tif --lat 35.075373 --lon 33.531142 --list --pictures /dev/null/new"
+    done = run_geofield(*line.split(), folder=sample)
+    assert done.returncode == 1
+    assert "/dev/null/new: Not a directory." in done.stderr
+    assert "Traceback" not in done.stderr
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
 @pytest.mark.parametrize("line", ["info field.gpkg", "import field.gpkg -o new.gpkg"])
 def test_a_link_that_leads_to_itself(tmp_path: Path, line: str) -> None:

@@ -112,7 +112,10 @@ def _show_warning(message: Warning | str, category: type[Warning], *_: Any, **__
 
 
 #: What the system says of a path that a person named.
-_NOT_OURS = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP, errno.EIO)
+_NOT_OURS = (
+    errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG, errno.ELOOP, errno.EIO,
+    errno.ENOTDIR,
+)  # fmt: skip
 _NO_NUMBER = re.compile(r"'(.*)' is not a valid (float|integer)(?: range)?\.")
 
 

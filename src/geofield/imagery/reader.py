@@ -107,7 +107,9 @@ class SceneReader:
             Without CRS or without position.
         """
         path = str(path)
-        crs, reach = options.crs, options.reach
+        # A name that is mistyped is refused, though a file may say its own.
+        crs = None if options.crs is None else parse_crs(options.crs)
+        reach = options.reach
         with gdal_env(path), open_picture(path, reach) as dataset:
             if dataset.count == 0:
                 inner, told, hint = dataset.subdatasets, "", "Give a raster file."
@@ -134,10 +136,10 @@ class SceneReader:
                     fill = undeclared_fill(dataset, roles.shown, alpha=roles.alpha, top=top)
             refuse_unplaced(dataset)
             # A file of ours says its own, which may be another than that of what it was made from.
-            own = crs is None or is_ours(tags)
-            own_crs = crs_of(dataset, path, options.point) if own else parse_crs(crs)
+            if crs is None or is_ours(tags):
+                crs = crs_of(dataset, path, options.point)
             dtype = str(np.result_type(*dtypes))
-            place = find_place(dataset, own_crs, point=options.point)
+            place = find_place(dataset, crs, point=options.point)
             negative = dataset.tags(ns="IMAGE_STRUCTURE").get("MINISWHITE") == "YES"
             filled = () if fill is None else (_FILLED.format(fill),)
             done = (*notes_from_tags(tags), *([_NEGATIVE] if negative else ()))

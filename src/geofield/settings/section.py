@@ -46,7 +46,10 @@ def words(value: Any) -> Any:
     parts = [value] if isinstance(value, str) else value
     if not isinstance(parts, list | tuple) or not all(isinstance(part, str) for part in parts):
         return value  # what is wrong is said by the setting's own check
-    return tuple(word.strip() for part in parts for word in part.split(","))
+    found = tuple(word.strip() for part in parts for word in part.split(","))
+    if found and not any(found):
+        raise ValueError("it is empty: leave it out, or name one")
+    return found
 
 
 class Section(BaseModel):
