@@ -23,7 +23,7 @@ from geofield.tracks.shapes import FIELD, Edges, polygon_edges
 
 #: Directions tried at most before those of the shorter edges are passed over.
 _MOST_ANGLES = 600
-#: Edges are those of the area without what stands out less, units of the CRS.
+#: Edges are those of the area without what stands out less, metres of the CRS.
 _PLAIN_M = 1.0
 
 
