@@ -37,7 +37,7 @@ function refused(error) {
 }
 
 // What the other tab did meanwhile to the plan that is shown here is shown first; what is typed here stays.
-const takeOver = () => act(async () => api.takeOver().then(() => api.openPlan(state.plan)), () => {
+const takeOver = () => act(() => api.takeOver().then(() => api.openPlan(state.plan)), () => {
   const values = inputs().filter(input => input.value !== input.dataset.shown).map(({name, value}) => [name, value]);
   sessionStorage.setItem("typed", JSON.stringify({plan: state.plan, values}));
   again();
