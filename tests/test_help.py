@@ -18,7 +18,7 @@ from geofield.cli.main import COMMANDS, cli
 from geofield_command import run_geofield
 
 
-@pytest.mark.parametrize("name", ["run", "field", "obstacles", "tracks"])
+@pytest.mark.parametrize("name", ["run", "field", "obstacles", "tracks", "batch"])
 def test_what_everyone_uses_comes_first_and_the_study_last(name: str) -> None:
     text = CliRunner().invoke(cli, [name, "--help"]).output
     groups = re.findall(r"^([A-Z][\w' ]+):$", text, re.MULTILINE)
@@ -31,6 +31,8 @@ def test_what_everyone_uses_comes_first_and_the_study_last(name: str) -> None:
     assert command is not None
     listed = re.findall(r"^  (-[-\w]+)", text, re.MULTILINE)
     assert len(listed) == len(set(listed))
+    # No row is a bare name.
+    assert not re.findall(r"^  \[?[A-Z][A-Za-z.]*\]?$", text, re.MULTILINE)
     options = [each for each in command.params if isinstance(each, click.Option)]
     assert {each.opts[0] for each in options} <= set(listed)
 

@@ -53,11 +53,12 @@ class GroupedCommand(click.Command):
         groups: dict[str, list[tuple[str, str]]] = {
             title: [] for title in ("Used by everyone", *TITLES.values(), "Further", STUDY)
         }
-        shown = sorted(self.get_params(ctx), key=_rank)
-        for parameter in shown:
-            record = parameter.get_help_record(ctx)
+        # Arguments are told in the text above; click gives some a row without a word.
+        options = [each for each in self.get_params(ctx) if isinstance(each, click.Option)]
+        for option in sorted(options, key=_rank):
+            record = option.get_help_record(ctx)
             if record is not None:
-                groups[group_of(parameter)].append(record)
+                groups[group_of(option)].append(record)
         for title, rows in groups.items():
             if rows:
                 with formatter.section(title):
