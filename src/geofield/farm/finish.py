@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from geofield.farm.edits import TAKEN, is_edited
 from geofield.farm.failed import write_failed
-from geofield.farm.folder import OVERVIEW, PROJECT
+from geofield.farm.folder import OVERVIEW
 from geofield.farm.marks import CHANGED, WORK
 from geofield.farm.overview import write_overview
 from geofield.farm.places import Places
 from geofield.farm.stac import COLLECTION, write_stac
 from geofield.farm.store import Store
 from geofield.farm.value import read_farm
-from geofield.formats.gpkg_guests import bring_guests, keep_project
 from geofield.imagery.gdal import display_name
-from geofield.staging import staged_folder
 
 
 def finish(store: Store, places: Places, *, anew: bool = True, overview: bool = True) -> list[str]:
@@ -69,11 +67,6 @@ def _catalogue(store: Store) -> list[str]:
 def _overview(store: Store) -> list[str]:
     if store.folder is None:
         return []
-    with staged_folder(store.folder, overwrite=True) as staging:
-        files = write_overview(read_farm(store.place), staging, name=store.folder.name)
-        if (store.folder / OVERVIEW).is_file():
-            # What a person keeps in it beside the farm comes along.
-            bring_guests(store.folder / OVERVIEW, staging / OVERVIEW)
-        keep_project(store.folder / PROJECT, staging / PROJECT)
+    files = write_overview(read_farm(store.place), store.folder, name=store.folder.name)
     store.remove(TAKEN)
     return [file.name for file in files]

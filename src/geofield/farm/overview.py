@@ -16,10 +16,11 @@ from geofield.farm.as_left import DETAILS, DIGESTS, OWN, TRACKS
 from geofield.farm.as_written import digests_of
 from geofield.farm.edited_tracks import EDITED, track_digests
 from geofield.farm.edits import remember_own
-from geofield.farm.folder import OVERVIEW
+from geofield.farm.folder import OVERVIEW, PROJECT
 from geofield.farm.layers import FIELD_ID
 from geofield.farm.value import Farm
 from geofield.formats.gpkg import write as write_gpkg
+from geofield.formats.gpkg_guests import bring_guests, keep_project
 from geofield.formats.many import Joined
 from geofield.model import ImagerySource, Provenance
 from geofield.staging import staged_folder
@@ -36,11 +37,17 @@ _DETAILS = tuple(
 
 
 def write_overview(farm: Farm, folder: Path, *, name: str = "Farm") -> list[Path]:
-    """Write ``farm.gpkg`` and ``farm.qgz``; `name` is the title of the project."""
+    """Write ``farm.gpkg`` and ``farm.qgz``; `name` is the title of the project.
+
+    What a person keeps beside the farm in those that are there comes along.
+    """
     with staged_folder(folder, overwrite=True) as staging:
         dataset = dataset_of(farm, name)
         written = write_gpkg(dataset, staging, stem=Path(OVERVIEW).stem, options={})
         remember_own(staging / OVERVIEW, dataset.tables)
+        if (folder / OVERVIEW).is_file():
+            bring_guests(folder / OVERVIEW, staging / OVERVIEW)
+        keep_project(folder / PROJECT, staging / PROJECT)
     return [folder / path.name for path in written]
 
 
