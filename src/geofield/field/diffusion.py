@@ -10,40 +10,28 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from geofield.errors import SettingsError
 from geofield.model import Scene
 
 #: Largest time step at which the explicit scheme with four neighbours is stable.
 _STEP = 0.2
+#: Steps; details of about ``sqrt(_STEPS / 2)`` pixels vanish.
+_STEPS = 12
+#: Difference of grey levels that counts as a border. The conductance is Perona and Malik's first,
+#: ``exp(-(difference / _BORDER)**2)``, which favours strong borders.
+_BORDER = 12.0
 
 
-def diffuse(
-    band: NDArray[np.generic], *, iterations: int = 12, kappa: float = 12.0
-) -> NDArray[np.float32]:
-    """One band after diffusion.
+def diffuse(band: NDArray[np.generic]) -> NDArray[np.float32]:
+    """A band (rows, columns) of grey levels, 0..255, after diffusion.
 
-    Parameters
-    ----------
-    band : array (rows, columns)
-        Grey levels, 0..255.
-    iterations : int
-        Steps; details of about ``sqrt(iterations / 2)`` pixels vanish.
-    kappa : float
-        Difference of grey levels that counts as a border. The conductance is Perona and
-        Malik's first, ``exp(-(difference / kappa)**2)``, which favours strong borders.
-
-    Notes
-    -----
     Nothing flows over the picture's edge, so that the mean stays the same.
     """
-    if iterations < 0 or not kappa > 0:
-        raise SettingsError("Diffusion takes iterations of at least 0 and a kappa above 0.")
     value = band.astype(np.float32)
-    for _ in range(iterations):
+    for _ in range(_STEPS):
         change = np.zeros_like(value)
         for along, changed in ((value, change), (value.T, change.T)):
             difference = np.diff(along, axis=0)
-            flow = difference * np.exp(-np.square(difference / kappa))
+            flow = difference * np.exp(-np.square(difference / _BORDER))
             changed[:-1] += flow
             changed[1:] -= flow
         value += np.float32(_STEP) * change
