@@ -200,7 +200,7 @@ def ground_scale(crs: CRS, x: ArrayLike, y: ArrayLike) -> Any:
         np.stack([at_y, at_y, at_y - _ARM_M, at_y + _ARM_M]),
     )
     refuse_outside(crs, lon, lat)
-    along, across, turn = _cross(lon, lat)
+    along, across, turn = cross(lon, lat)
     # The axes of the ellipse that a circle becomes; a conformal CRS leaves it one.
     apart = np.hypot((along / across - across / along) / 2.0, np.cos(turn))
     middle = (along / across + across / along) / 2.0
@@ -231,17 +231,11 @@ def refuse_outside(crs: CRS, *brought: ArrayLike, what: str = "Coordinates") -> 
         )
 
 
-def side_of_cross_m(lon: Any, lat: Any) -> Any:
-    """The side of the square with the area that two geodesics span, metres.
+def cross(lon: Any, lat: Any) -> tuple[Any, Any, Any]:
+    """The lengths of two geodesics, metres, and the angle between them, radians.
 
     The ends of the first are in the first two rows, those of the second, across it, in the others.
     """
-    along, across, turn = _cross(lon, lat)
-    return np.sqrt(along * across * np.abs(np.sin(turn)))
-
-
-def _cross(lon: Any, lat: Any) -> tuple[Any, Any, Any]:
-    """The lengths of two geodesics, metres, and the angle between them, radians."""
     azimuth_x, _, along_x = GEOD.inv(lon[0], lat[0], lon[1], lat[1])
     azimuth_y, _, along_y = GEOD.inv(lon[2], lat[2], lon[3], lat[3])
     turn = np.radians(np.subtract(azimuth_y, azimuth_x))

@@ -21,9 +21,9 @@ from geofield.crs import (
     WEB_MERCATOR,
     WEB_MERCATOR_MAX_LAT,
     authority_name,
+    cross,
     metric_crs,
     parse_crs,
-    side_of_cross_m,
     transformer,
 )
 from geofield.errors import CRSError, GridError, is_truth, refuse_no_number
@@ -248,11 +248,16 @@ class Grid:
 
     def resolution_at(self, x_px: ArrayLike, y_px: ArrayLike) -> Any:
         """Metres per pixel on the ground at pixel positions; scalars or arrays."""
+        along, across, turn = self.pixel_sides(x_px, y_px)
+        return _like(np.sqrt(along * across * np.abs(np.sin(turn))))
+
+    def pixel_sides(self, x_px: ArrayLike, y_px: ArrayLike) -> tuple[Any, Any, Any]:
+        """The sides of pixels around positions, metres on the ground, and their angle, radians."""
         x, y = np.asarray(x_px, float), np.asarray(y_px, float)
         lon, lat = self.to_lonlat(
             np.stack([x - 0.5, x + 0.5, x, x]), np.stack([y, y, y - 0.5, y + 0.5])
         )
-        return _like(side_of_cross_m(lon, lat))
+        return cross(lon, lat)
 
     def corners_lonlat(self) -> list[tuple[float, float]]:
         """The four corners, clockwise from the top-left, as (lon, lat) in degrees."""

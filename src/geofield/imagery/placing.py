@@ -17,7 +17,7 @@ from rasterio.transform import from_gcps
 from rasterio.vrt import WarpedVRT
 from rasterio.windows import Window
 
-from geofield.crs import GEOD, LONLAT, metric_crs, transformer
+from geofield.crs import LONLAT, metric_crs, transformer
 from geofield.datum import datum_notes
 from geofield.errors import CRSError
 from geofield.grid import Grid
@@ -141,18 +141,14 @@ def pixel_shape(grid: Grid, point: LonLat | None = None) -> tuple[float, float]:
         px, py = grid.from_lonlat(*point)
         if grid.contains_px(px, py):
             x, y = px, py
-    lons, lats = grid.to_lonlat(
-        np.array([x - 0.5, x + 0.5, x, x]), np.array([y, y, y - 0.5, y + 0.5])
-    )
-    azimuth_x, _, length_x = GEOD.inv(lons[0], lats[0], lons[1], lats[1])
-    azimuth_y, _, length_y = GEOD.inv(lons[2], lats[2], lons[3], lats[3])
-    angle = abs((azimuth_y - azimuth_x) % 180.0 - 90.0)
-    if not min(length_x, length_y) > 0:
+    along, across, turn = grid.pixel_sides(x, y)
+    if not min(along, across) > 0:
         raise CRSError(
             f"The picture's centre is not a place on earth in {grid.crs.name}.",
             hint="Check the picture's transform and CRS with `gdalinfo`.",
         )
-    return max(length_x, length_y) / min(length_x, length_y), angle
+    aspect = max(along, across) / min(along, across)
+    return float(aspect), float(abs(np.degrees(turn) % 180.0 - 90.0))
 
 
 def border_px(grid: Grid, per_side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
