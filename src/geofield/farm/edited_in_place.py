@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Set
 from pathlib import Path
 from typing import Any
@@ -58,7 +57,7 @@ def _begun(store: Store) -> frozenset[str]:
 
     They are no edits made here, and are put again from the overview.
     """
-    overview, *ids = json.loads(store.get(BEGUN) or b'[""]')
+    overview, *ids = store.noted(BEGUN) or [""]
     return frozenset(map(file_of, ids) if Path(overview).is_file() else ())
 
 

@@ -291,8 +291,7 @@ def is_edited(folder: Path, overview: Path) -> bool:
 def _taken(store: Store, overview: Path) -> dict[str, str]:
     """The edits of a farm's own overview that it holds already; none of another one."""
     own = store.folder is not None and overview.parent.samefile(store.folder)
-    taken: dict[str, str] = json.loads((store.get(TAKEN) if own else None) or b"{}")
-    return taken
+    return store.noted(TAKEN) if own else {}
 
 
 def put_edits(
@@ -354,10 +353,10 @@ def put_edits(
 
     def begin() -> None:
         # Where all ends amid this, the same is done again, from the farm as it is until then.
-        store.put(BEGUN, json.dumps([str(overview.absolute()), *plans]).encode())
+        store.note(BEGUN, [str(overview.absolute()), *plans])
 
     def note() -> None:
-        store.put(TAKEN, json.dumps(taken | {one: edits.marks[one] for one in here}).encode())
+        store.note(TAKEN, taken | {one: edits.marks[one] for one in here})
         store.remove(BEGUN)
 
     tell_double(store, overview, elsewhere)

@@ -6,7 +6,6 @@ tells nothing. That they are others than it was put with is a person's word.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from typing import Any
 
@@ -21,12 +20,12 @@ _FILE = f"{REVIEWED}/.settings.json"
 def note_settings(store: Store, plans: Iterable[Plan]) -> None:
     """Note the settings of plans that were put into a farm."""
     noted = settings_put(store) | {plan.field.field_id: track_values(plan) for plan in plans}
-    store.put(_FILE, json.dumps(noted, sort_keys=True).encode())
+    store.note(_FILE, noted)
 
 
 def settings_put(store: Store) -> dict[str, dict[str, Any]]:
     """The settings of the tracks of all plans that were put into a farm, by field id."""
-    noted: dict[str, dict[str, Any]] = json.loads(store.get(_FILE) or b"{}")
+    noted: dict[str, dict[str, Any]] = store.noted(_FILE)
     return noted
 
 

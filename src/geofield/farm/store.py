@@ -5,6 +5,7 @@ Every file comes into place whole: by a rename on a disk, by its upload in an ob
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -119,6 +120,14 @@ class Store:
             raise FormatError(
                 f"{self.shown}/{name} cannot be read: {_short(error)}", hint=_RIGHTS
             ) from None
+
+    def note(self, name: str, value: Any) -> None:
+        """Keep a JSON value as a file."""
+        self.put(name, json.dumps(value, sort_keys=True).encode())
+
+    def noted(self, name: str) -> Any:
+        """The JSON value that a file keeps; an empty mapping where there is none."""
+        return json.loads(self.get(name) or b"{}")
 
     def names(self, folder: str) -> list[str]:
         """The names in a folder, sorted; none where there is no such folder."""

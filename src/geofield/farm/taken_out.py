@@ -7,7 +7,6 @@ was put back from, so that the same file can be put back again and again.
 from __future__ import annotations
 
 import hashlib
-import json
 import platform
 from dataclasses import replace
 from pathlib import Path
@@ -50,7 +49,7 @@ def refuse_changed(plan: Plan, before: Plan, plan_file: Path, store: Store) -> N
     """
     field_id, there = before.field.field_id, plan_digest(before)
     taken = plan.evidence.farm.get(_TAKEN)
-    if there == taken or _puts(store).get(field_id) == [_name_of(plan_file), there]:
+    if there == taken or store.noted(PUT).get(field_id) == [_name_of(plan_file), there]:
         return
     raise FormatError(
         f"{store.shown} holds a reviewed plan of {field_id} from which {plan_file.name} was not "
@@ -64,13 +63,8 @@ def refuse_changed(plan: Plan, before: Plan, plan_file: Path, store: Store) -> N
 
 def note_put(plan: Plan, plan_file: Path, store: Store) -> None:
     """Note from which file a plan of the farm was put back."""
-    puts = _puts(store) | {plan.field.field_id: [_name_of(plan_file), plan_digest(plan)]}
-    store.put(PUT, json.dumps(puts, sort_keys=True).encode())
-
-
-def _puts(store: Store) -> dict[str, Any]:
-    puts: dict[str, Any] = json.loads(store.get(PUT) or b"{}")
-    return puts
+    put = {plan.field.field_id: [_name_of(plan_file), plan_digest(plan)]}
+    store.note(PUT, store.noted(PUT) | put)
 
 
 def _name_of(file: Path) -> str:
