@@ -6,7 +6,7 @@ prints both and exits with code 1; it never shows a traceback for a :class:`Geof
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from functools import partial
 from math import isfinite, isinf, isnan, nan
 from numbers import Real
@@ -174,7 +174,13 @@ class ChangedError(FormatError):
 
 
 class SeveralFieldsError(FormatError):
-    """A file holds several fields where one is wanted."""
+    """A file holds several fields where one is wanted.
+
+    `as_obstacles` makes the dataset in which they are obstacles, where another file may have the
+    field that they lie in.
+    """
+
+    as_obstacles: Callable[[], Any] | None = None
 
 
 class EmptyFileError(FormatError):

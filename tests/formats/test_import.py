@@ -300,3 +300,32 @@ def test_files_of_a_folder_that_are_not_read_are_told(tmp_path):
     assert "nothing else: boundary.shp must be named" in said
     found, said, _ = imported(tmp_path, folder, folder / "boundary.shp", "--overwrite")
     assert found["rows"] == {"field": 1, "obstacles": 3}
+
+
+@pytest.mark.parametrize("files", [("edge.shp", "stones.shp"), ("stones.shp", "edge.shp")])
+def test_polygons_in_the_outline_of_another_file_are_obstacles(tmp_path, files):
+    write(tmp_path / "edge.shp", [BOX])
+    write(tmp_path / "stones.shp", [POND, *TREES])
+    found, said, _ = imported(tmp_path, *(tmp_path / file for file in files))
+    assert found["rows"] == {"field": 1, "obstacles": 4}
+    assert "stones: 4 polygons taken as obstacles" in said
+
+
+def test_polygons_that_lie_in_no_other_outline_or_in_two_are_not_guessed(tmp_path):
+    edge = write(tmp_path / "edge.shp", [BOX])
+    stones = write(tmp_path / "stones.shp", [POND, *TREES])
+    over = write(tmp_path / "over.shp", [POND, shapely.affinity.translate(POND, 140)])
+    around = write(tmp_path / "around.shp", [BOX.buffer(50)])
+    for files in ((stones,), (over, edge), (edge, stones, around)):
+        done = geofield("import", *files, "-o", tmp_path / "plan.gpkg")
+        assert done.returncode == 1
+        assert "outlines; a dataset is one field" in done.stderr
+
+
+def test_a_pond_among_points_of_another_file_is_an_obstacle(tmp_path):
+    edge = write(tmp_path / "edge.shp", [BOX])
+    stands = write(tmp_path / "stands.gpkg", [POND, shapely.Point(500_100, 5_500_050)])
+    found, said, back = imported(tmp_path, edge, stands)
+    assert found["rows"] == {"field": 1, "obstacles": 2}
+    assert "stands: its polygon lies in another one: taken as an obstacle" in said
+    assert sorted(back.table("obstacles")["obstacle_no"]) == [1, 2]

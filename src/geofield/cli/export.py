@@ -88,6 +88,7 @@ def export(
     from geofield.formats import format_named, read_dataset, write_datasets
     from geofield.formats.export import unknown_option
     from geofield.formats.many import apart
+    from geofield.formats.registry import products as products_of
 
     given["zip"] = given.pop("zipped") or None
     options = {key: value for key, value in given.items() if value is not None}
@@ -105,7 +106,7 @@ def export(
     cuts = click.get_current_context().with_resource(
         tempfile.TemporaryDirectory(prefix="geofield-")
     )
-    for plan_file in plan_files:
+    for plan_file in products_of(plan_files):
         below = picture
         if is_farm(plan_file):
             from geofield.farm.pictures import pictures_of

@@ -50,12 +50,12 @@ def import_(
     where it began, is the field; of several, whole words of the layers' names (boundary, trees),
     their columns, and what lies in what decide. What was taken as what is said on stderr.
     """
-    from geofield.formats import read_dataset, write_dataset
-    from geofield.formats.importing import merged, recorded
+    from geofield.formats import write_dataset
+    from geofield.formats.importing import read_together, recorded
     from geofield.plan_files import staged_plan
 
     claim_plan(output)
-    dataset = recorded(merged([read_dataset(file, crs=crs) for file in files], name=name))
+    dataset = recorded(read_together(files, crs=crs, name=name))
     with staged_plan(output, overwrite=overwrite, inputs=files) as staging:
         shown = {"picture": dataset.picture_lies_in(output.parent)}
         write_dataset(dataset, staging, ["gpkg"], stem=output.stem, options=shown)

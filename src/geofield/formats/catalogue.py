@@ -44,6 +44,7 @@ _RDFXML = Format(
     drops=(_OWN,),
     precision_m=0.0,
     options=("rdf_profile", "base_iri", "plan_name", "points"),
+    tabular=False,
     fields="many",
 )
 
@@ -73,6 +74,7 @@ _ISOXML = Format(
     several="geofield.formats.isoxml.read:several",
     validator="geofield.formats.checks.isoxml:check",
     steers=True,
+    tabular=False,
     reads_folders=True,
     fields="many",
 )
@@ -243,6 +245,7 @@ CATALOGUE: tuple[Format, ...] = (
         precision_m=0.005,
         validator="geofield.formats.checks.agopengps:check",
         steers=True,
+        tabular=False,
         reads_folders=True,
         fields="apart",
     ),

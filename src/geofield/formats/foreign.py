@@ -20,10 +20,11 @@ from shapely.errors import GEOSException
 
 from geofield import schema
 from geofield.crs import LONLAT, metric_crs, parse_crs, transformer
-from geofield.errors import EmptyFileError, FormatError, FormatWarning
+from geofield.errors import EmptyFileError, FormatError, FormatWarning, SeveralFieldsError
 from geofield.finite import refuse_nowhere
 from geofield.formats.antimeridian import joined, unwrapped
 from geofield.formats.catalogue import PARQUET
+from geofield.formats.registry import refuse_no_rows
 from geofield.formats.sorting import RawLayer, sort_out
 from geofield.model import Dataset
 from geofield.notes import warn
@@ -147,9 +148,10 @@ def read_parquet(path: Path) -> gpd.GeoDataFrame:
 
 
 def _look_at(path: Path) -> None:
-    """Refuse files that lead elsewhere; schemas that GML names are not fetched."""
+    """Refuse files that lead elsewhere or hold no rows; schemas that GML names are not fetched."""
     import pyogrio
 
+    refuse_no_rows(path)
     check_vector(path)
     pyogrio.set_gdal_config_options({"GML_DOWNLOAD_SCHEMA": "NO"})
 
@@ -275,7 +277,8 @@ def read_foreign(
         else schema.conform(schema.layer(name), pd.concat(parts), extras=True)
         for name, parts in own.items()
     }
-    guessed = sort_out(foreign, tables, metric, path)
+
+    guessed = _guessed(foreign, tables, metric, path, name)
     # A file of geofield alone leaves nothing to guess.
     notes = notes + guessed if guessed else []
     if not any(len(table) for table in tables.values()):
@@ -287,6 +290,22 @@ def read_foreign(
     if name is None and named and isinstance(named[0], str):
         name = named[0]
     return Dataset(tables, metric, name or path.stem, notes=tuple(notes))
+
+
+def _guessed(
+    layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: Path, name: str | None
+) -> list[str]:
+    """What `sort_out` tells; where it finds several outlines they may be obstacles."""
+
+    def as_obstacles() -> Dataset:
+        notes = sort_out(layers, tables, metric, path, inside=True)
+        return Dataset(tables, metric, name or path.stem, notes=tuple(notes))
+
+    try:
+        return sort_out(layers, tables, metric, path)
+    except SeveralFieldsError as error:
+        error.as_obstacles = as_obstacles
+        raise
 
 
 def _read(frame: gpd.GeoDataFrame, where: str, crs: CRS | None) -> gpd.GeoDataFrame:

@@ -84,7 +84,8 @@ def field_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoDataFra
         shown = "" if names is None else f" ({some_of([*map(cell_text, names)], 5)})"
         raise SeveralFieldsError(
             f"{path.name} holds {len(frame)} outlines{shown}; a dataset is one field.",
-            hint="Save the one you want as a file of its own.",
+            hint="Save the one you want as a file of its own. Obstacles are known by the field's "
+            "boundary around them, or by their file's or layer's name, such as trees.",
         )
     polygon = shapely.orient_polygons(shapely.force_2d(frame.geometry.iloc[0]))
     ids = column_like(frame, ID_COLUMNS)

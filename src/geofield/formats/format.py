@@ -80,6 +80,8 @@ class Format:
         The options its writer understands.
     asks_crs : bool
         Whether its reader takes a ``crs`` for files that do not say theirs.
+    tabular : bool
+        Whether GDAL and others read its files as tables of rows, each of which may be a field.
     reads_folders : bool
         Whether its reader takes a folder of files; else a folder must hold just one.
     automatic : bool
@@ -114,6 +116,7 @@ class Format:
     options: tuple[str, ...] = ()
     asks_crs: bool = False
     validator: str | None = None
+    tabular: bool = True
     reads_folders: bool = False
     automatic: bool = False
     fields: Literal["one", "apart", "many", "joined"] = "one"

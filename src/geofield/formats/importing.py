@@ -13,11 +13,12 @@ from pyproj import CRS
 
 from geofield import schema
 from geofield.crs import parse_crs
-from geofield.errors import FormatError, FormatWarning
+from geofield.errors import FormatError, FormatWarning, SeveralFieldsError
 from geofield.formats.foreign_tables import obstacle_table
-from geofield.formats.registry import detect, passed_over, product_file
+from geofield.formats.registry import detect, passed_over, product_files, products
 from geofield.formats.zipped import unpacked
 from geofield.model import Dataset
+from geofield.model.obstacles import numbered
 from geofield.model.review import reconcile
 from geofield.notes import warn
 from geofield.wording import some_of
@@ -54,13 +55,48 @@ def read_dataset(path: Path | str, *, crs: CRS | str | None = None) -> Dataset:
             f"{some_of(others, 5)} must be named to be read, too.",
             FormatWarning,
         )
-    place = product_file(place, found)
+    place = product_files(place, found)[0]
     reader = found.load_reader()
     if crs is None:
         return reader(place)
     if not found.asks_crs:
         raise FormatError(f"{found.title} files say their CRS themselves.", hint="Leave out --crs.")
     return reader(place, crs=parse_crs(crs))
+
+
+def read_together(
+    paths: Sequence[Path], *, crs: CRS | str | None = None, name: str | None = None
+) -> Dataset:
+    """The dataset of one field in several files, which together say what each of them holds.
+
+    Several polygons of a file that could be outlines are obstacles where they lie in the one
+    outline of another. Files that are read along with one of the others are read once.
+
+    Raises
+    ------
+    FormatError
+        As of `read_dataset` and `merged`.
+    """
+    read: list[Dataset] = []
+    named = products(paths)
+    doubtful: list[tuple[SeveralFieldsError, Dataset]] = []
+    for path in named:
+        try:
+            read.append(read_dataset(path, crs=crs))
+        except SeveralFieldsError as error:
+            if error.as_obstacles is None or len(named) == 1:
+                raise
+            read.append(error.as_obstacles())
+            doubtful.append((error, read[-1]))
+    outlines = [each for each in read if each.has(schema.FIELD.name)]
+    for several, dataset in doubtful:
+        places = dataset.table(schema.OBSTACLES.name)
+        around = [
+            each for each in outlines if places.to_crs(each.crs).covered_by(_outer(each)).all()
+        ]
+        if len(around) != 1:
+            raise several
+    return merged(read, name=name)
 
 
 def merged(datasets: Sequence[Dataset], *, name: str | None = None) -> Dataset:
@@ -113,6 +149,11 @@ def merged(datasets: Sequence[Dataset], *, name: str | None = None) -> Dataset:
     )
 
 
+def _outer(dataset: Dataset) -> shapely.Polygon:
+    """The outline of a dataset's field, whatever holes it has."""
+    return shapely.Polygon(dataset.table(schema.FIELD.name).geometry.iloc[0].exterior)
+
+
 def recorded(dataset: Dataset) -> Dataset:
     """A dataset with a record of its obstacles, by which it is known what is edited of them later.
 
@@ -136,7 +177,7 @@ def _with_inner_fields_as_obstacles(
         for each in datasets
     ]
     fields = [each.table(schema.FIELD.name) for each in moved]
-    outer = [shapely.Polygon(t.geometry.iloc[0].exterior) if len(t) else None for t in fields]
+    outer = [_outer(each) if each.has(schema.FIELD.name) else None for each in moved]
     for number, shape in enumerate(outer):
         around = [other for other in outer if other is not None and other is not shape]
         if shape is None or not any(
@@ -148,10 +189,15 @@ def _with_inner_fields_as_obstacles(
         own = schema.own_columns(schema.FIELD, fields[number])
         # Its own name, or that of its file, is all that tells what it is.
         inner = obstacle_table(fields[number][["name", *own, "geometry"]], crs, Path(dataset.name))
-        if schema.OBSTACLES.name in rest:
-            raise FormatError(
-                f"{dataset.name} lies in another of the fields.", hint="Import one of them."
-            )
-        moved[number] = replace(dataset, tables={**rest, schema.OBSTACLES.name: inner})
+        standing = [table for table in (dataset.table(schema.OBSTACLES.name), inner) if len(table)]
+        inner["obstacle_no"] = pd.NA  # behind those that have numbers
+        whole = numbered(pd.concat(standing, ignore_index=True))
+        moved[number] = replace(
+            dataset,
+            tables={
+                **rest,
+                schema.OBSTACLES.name: schema.conform(schema.OBSTACLES, whole, extras=True),
+            },
+        )
         notes.append(f"{dataset.name}: its polygon lies in another one: taken as an obstacle")
     return moved

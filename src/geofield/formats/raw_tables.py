@@ -19,7 +19,7 @@ from geofield.errors import CRSError, FormatError, MissingFileError
 from geofield.formats.catalogue import PARQUET
 from geofield.formats.foreign import refuse_layer
 from geofield.formats.gpkg_read import is_own
-from geofield.formats.registry import detect
+from geofield.formats.registry import detect, refuse_no_rows
 from geofield.formats.row_crs import refuse_other_rows
 from geofield.formats.zipped import unpacked
 from geofield.strangers import check_vector, unreadable
@@ -216,6 +216,7 @@ def _vector(path: Path, layer: str | None) -> RawTable:
     from pyogrio.errors import DataLayerError, DataSourceError
 
     check_vector(path)
+    refuse_no_rows(path)
     try:
         listed = pyogrio.list_layers(path)
         layers = [str(name) for name, kind in listed if kind is not None]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 
@@ -12,8 +12,18 @@ from geofield.errors import FormatError, MissingFileError, UnknownFormatError
 from geofield.formats.catalogue import CATALOGUE
 from geofield.formats.format import Drop, Format
 from geofield.strangers import check_vector, is_geopackage
+from geofield.wording import command
 
-__all__ = ["FORMATS", "Drop", "Format", "detect", "format_named", "product_file"]
+__all__ = [
+    "FORMATS",
+    "Drop",
+    "Format",
+    "detect",
+    "format_named",
+    "product_files",
+    "products",
+    "task_file",
+]
 
 _TASK_DATA = b"ISO11783_TaskData"
 
@@ -80,8 +90,27 @@ def detect(path: Path | str) -> Format:
     )
 
 
-def product_file(place: Path, found: Format) -> Path:
-    """What a format's reader is given for a path: the path, or the one file in that folder.
+def products(paths: Iterable[Path]) -> list[Path]:
+    """Paths without other files that are read along with one before them."""
+    first: dict[str, Path] = {}
+    return [path for path in paths if first.setdefault(_product_of(path), path) == path]
+
+
+def _product_of(file: Path) -> str:
+    """What a file is a part of: the files of a product that lie side by side are read together."""
+    text = str(file.absolute())
+    for each in FORMATS.values():
+        ends = each.files if each.reader and len(each.files) > 1 and not each.reads_folders else ()
+        for end in ends:
+            if text.endswith(end):
+                return text.removesuffix(end)
+    return text
+
+
+def product_files(place: Path, found: Format) -> list[Path]:
+    """What a format reads of a path: the path, or the one product in that folder.
+
+    Its reader is given the first.
 
     Raises
     ------
@@ -89,13 +118,31 @@ def product_file(place: Path, found: Format) -> Path:
         When the folder holds several.
     """
     if not place.is_dir() or found.reads_folders:
-        return place
+        return [place]
     files = sorted(file for file in place.iterdir() if file.suffix.lower() in found.suffixes)
-    if len(files) != 1:
+    if len(products(files)) != 1:
         raise FormatError(
             f"{place} holds {len(files)} {found.title} files.", hint="Name one of them."
         )
-    return files[0]
+    return files
+
+
+def refuse_no_rows(path: Path) -> None:
+    """Refuse where rows are wanted a file or folder of a field that only `read_dataset` reads.
+
+    Raises
+    ------
+    FormatError
+    """
+    try:
+        found = detect(path)
+    except FormatError:
+        return
+    if not found.tabular:
+        raise FormatError(
+            f"{path} ({found.title}) is not read as rows of fields or obstacles.",
+            hint=f"Name the plan that `{command('import', path, '-o', 'field.gpkg')}` makes of it.",
+        )
 
 
 def passed_over(folder: Path, found: Format) -> list[str]:
@@ -106,11 +153,22 @@ def passed_over(folder: Path, found: Format) -> list[str]:
     return sorted(file.name for file in folder.iterdir() if file.suffix.lower() in others)
 
 
+def task_file(path: Path) -> Path:
+    """The ``TASKDATA.XML`` that a path means: itself, in it, or in its ``TASKDATA`` folder."""
+    if path.is_file():
+        return path
+    for folder in (path, *(p for p in sorted(path.iterdir()) if p.name.upper() == "TASKDATA")):
+        for file in sorted(folder.iterdir()):
+            if file.name.upper() == "TASKDATA.XML":
+                return file
+    raise FormatError(
+        f"{path} holds no TASKDATA.XML.", hint="Name the folder TASKDATA of a terminal or stick."
+    )
+
+
 def _detect_folder(folder: Path) -> Format:
     names = {path.name.upper() for path in folder.iterdir()}
     if "TASKDATA.XML" in names or "TASKDATA" in names:
-        from geofield.formats.isoxml.read import task_file
-
         return _isoxml_of(_head(task_file(folder)))
     deeper = (place for depth in ("*", "*/*") for place in folder.glob(f"{depth}/Field.txt"))
     if {"FIELD.TXT", "BOUNDARY.TXT"} & names or any(deeper):

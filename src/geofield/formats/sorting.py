@@ -103,7 +103,14 @@ class _Part:
         return f"{self.layer}: {counted(count, thing)} {what}"
 
 
-def sort_out(layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: Path) -> list[str]:
+def sort_out(
+    layers: list[RawLayer],
+    tables: dict[str, Any],
+    metric: CRS,
+    path: Path,
+    *,
+    inside: bool = False,
+) -> list[str]:
     """Give every foreign geometry its place, and tell what was taken as what, or left out.
 
     Parameters
@@ -114,11 +121,13 @@ def sort_out(layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: 
         The layers found already, by name; what is found here is added.
     path : Path
         For messages and names.
+    inside : bool
+        Whether all lies in the field of another file: no polygon is an outline.
     """
     parts = [part for layer in layers for part in _parts(layer)]
     notes: list[str] = []
     polygons = _without_asides([part for part in parts if part.kind == "Polygon"], tables, notes)
-    outlines, inside = _outlines(polygons, tables, notes)
+    outlines, within = _outlines(polygons, inside or "field" in tables, notes)
     points = [part for part in parts if part.kind == "Point"]
     notes += [part.told(len(part.frame), "taken as obstacles") for part in points]
     if outlines:
@@ -127,7 +136,7 @@ def sort_out(layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: 
     lines = [part for part in parts if part.kind == "LineString"]
     fences = [part for part in lines if _words(part.layer) & _OBSTACLE_WORDS]
     notes += [part.told(len(part.frame), "taken as obstacles, by name") for part in fences]
-    standing = [*(part.frame for part in (*points, *fences)), *inside]
+    standing = [*(part.frame for part in (*points, *fences)), *within]
     if standing:
         found = obstacle_table(_repaired(_joined(standing), path), metric, path)
         if "obstacles" in tables:  # behind those that have numbers
@@ -190,13 +199,11 @@ def _with_length(parts: list[_Part], notes: list[str]) -> list[_Part]:
     return kept
 
 
-def _outlines(
-    parts: list[_Part], tables: dict[str, Any], notes: list[str]
-) -> tuple[list[Any], list[Any]]:
-    """Frames of outlines, and frames of polygons that are obstacles."""
+def _outlines(parts: list[_Part], known: bool, notes: list[str]) -> tuple[list[Any], list[Any]]:
+    """Frames of outlines, none where it is known, and frames of polygons that are obstacles."""
     if not parts:
         return [], []
-    if "field" in tables:
+    if known:
         notes += [part.told(len(part.frame), "taken as obstacles") for part in parts]
         return [], [part.frame for part in parts]
     if sum(len(part.frame) for part in parts) == 1:

@@ -24,7 +24,7 @@ from geofield.formats.clear_way import DRIVEN, WITHIN, driven_through, leaving
 from geofield.formats.format import Format
 from geofield.formats.importing import read_dataset
 from geofield.formats.many import apart
-from geofield.formats.registry import detect, product_file
+from geofield.formats.registry import detect, product_files
 from geofield.formats.zipped import unpacked
 from geofield.model import Dataset
 from geofield.model.evidence import Evidence
@@ -76,12 +76,12 @@ def validate_file(path: Path | str) -> list[Finding]:
     if place.suffix.lower() == ".qgz" and place.is_file():
         return [_of_project(place)]
     found = detect(place)
-    place = product_file(place, found)
+    place, *others = product_files(place, found)
     check = found.load_validator()
     findings: list[Finding] = []
     try:
-        for each in check(place) if check is not None else ():
-            findings.append(each)
+        for file in (place, *others):
+            findings.extend(() if check is None else check(file))
     except FormatError as error:
         findings.append(Finding("error", place.name, str(error)))
     if found.reader is None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from geofield.formats.isoxml.codes import DESIGNATOR
-from geofield.formats.isoxml.read import task_file
+from geofield.formats.registry import task_file
 from geofield.formats.validation import Finding
 from geofield.formats.xml import read_xml
 

@@ -19,6 +19,7 @@ from geofield.errors import FormatError, SeveralFieldsError
 from geofield.formats.foreign import RawLayer, read_foreign
 from geofield.formats.isoxml.codes import LineType, PointType, PolygonType
 from geofield.formats.isoxml.guidance import guidance_lines, position
+from geofield.formats.registry import task_file
 from geofield.formats.xml import read_xml
 from geofield.model import Dataset
 from geofield.wording import counted
@@ -89,19 +90,6 @@ def _dataset(field: ET.Element, file: Path) -> Dataset:
     found = [RawLayer.of_rows(name, rows) for name, rows in layers.items() if rows]
     dataset = read_foreign(found, file, name=field.get("C") or file.parent.name)
     return replace(dataset, notes=(*_told(field), *lines_told))
-
-
-def task_file(path: Path) -> Path:
-    """The ``TASKDATA.XML`` that a path means: itself, in it, or in its ``TASKDATA`` folder."""
-    if path.is_file():
-        return path
-    for folder in (path, *(p for p in sorted(path.iterdir()) if p.name.upper() == "TASKDATA")):
-        for file in sorted(folder.iterdir()):
-            if file.name.upper() == "TASKDATA.XML":
-                return file
-    raise FormatError(
-        f"{path} holds no TASKDATA.XML.", hint="Name the folder TASKDATA of a terminal or stick."
-    )
 
 
 def _external(root: ET.Element, folder: Path) -> list[ET.Element]:
