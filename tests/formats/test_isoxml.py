@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -13,9 +14,11 @@ from isoxml.models.base import v3, v4
 from isoxml.util.isoxml_io import isoxml_from_path
 from pyproj import Geod
 
+from geofield import __version__
 from geofield.errors import FormatError
 from geofield.formats import read_dataset, validate_file, write_dataset
 from geofield.formats.arrow import to_lonlat
+from geofield.model.dataset import Provenance
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
 NAMES = {4: "isoxml", 3: "isoxml-v3"}
@@ -52,6 +55,16 @@ def test_a_second_reader_understands_it(files, version):
     expected = to_lonlat(dataset.table("field").geometry.to_numpy(), dataset.crs)[0]
     outline = shapely.Polygon(ring)
     assert shapely.hausdorff_distance(outline, shapely.Polygon(expected.exterior)) < 2e-9
+
+
+@pytest.mark.parametrize("version", [3, 4])
+def test_who_wrote_it_is_told_of_an_imported_field_too(tmp_path, version):
+    """It said version 0."""
+    dataset = replace(make_dataset(), provenance=Provenance())
+    (file,) = write_dataset(dataset, tmp_path, [NAMES[version]])
+    root = ET.parse(file).getroot()
+    assert root.get("ManagementSoftwareManufacturer") == "geofield"
+    assert root.get("ManagementSoftwareVersion") == __version__
 
 
 def test_guidance_of_version_4(files):

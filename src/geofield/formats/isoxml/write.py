@@ -18,7 +18,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from geofield import schema
+from geofield import __version__, schema
 from geofield.crs import GEOD, ground_areas_m2, ground_scale_of
 from geofield.errors import FormatError, refuse_unknown
 from geofield.formats.arrow import to_lonlat
@@ -78,7 +78,7 @@ write_v3 = partial(_write, version=3)
 
 
 def _task_data(datasets: Sequence[Dataset], version: int, options: Mapping[str, Any]) -> ET.Element:
-    software = datasets[0].provenance.software or "geofield"
+    software = datasets[0].provenance.software or f"geofield {__version__}"
     maker, _, number = software.partition(" ")
     root = ET.Element(
         "ISO11783_TaskData",
