@@ -1,6 +1,7 @@
 """What a driver loses, counted on ground where the answer is known."""
 
 import json
+from typing import Any
 
 import geopandas as gpd
 import numpy as np
@@ -97,6 +98,20 @@ def test_a_field_without_anything_costs_nothing():
 def test_tracks_need_their_field():
     with pytest.raises(ObstacleError, match="area"):
         gf.evaluate(around("detected", 0.9, (1, 1)), points((1, 1)), segments=lines(5))
+
+
+@pytest.mark.parametrize("missing", ["area", "segments"])
+def test_a_picture_that_a_mapping_lacks_is_named(missing):
+    found, truth = around("detected", 0.9, (80, 50)), points((20, 11), (50, 50))
+    given: Any = {"area": {"north": FIELD, "east": FIELD}, "segments": {"north": lines(10)}}
+    given["segments"]["east"] = lines(10)
+    both = {"north": found, "east": found}, {"north": truth, "east": truth}
+    assert gf.evaluate(*both, **given, bootstrap=0).driving.things == 4
+    del given[missing]["east"]
+    with pytest.raises(ObstacleError, match=f"There is no {missing} of picture 'east'"):
+        gf.evaluate(*both, **given, bootstrap=0)
+    with pytest.raises(ObstacleError, match="one for all"):
+        gf.evaluate(found, truth, **given, bootstrap=0)
 
 
 def test_segments_of_another_zone_are_brought_to_the_area():

@@ -99,7 +99,8 @@ def evaluate(
     Raises
     ------
     ObstacleError
-        When the distance is not above zero, a picture has no truth or a radius is no number.
+        When the distance is not above zero, a picture has no truth, or none of the areas or
+        segments that are given by picture, or a radius is no number.
     CRSError
         When a table has no CRS, or the detected obstacles are not in metres.
     """
@@ -113,8 +114,7 @@ def evaluate(
     rows: dict[str, Counts] = {}
     false_kinds: Counter[str] = Counter()
     for name in found:
-        within = area.get(name) if isinstance(area, Mapping) else area
-        a, b = compared(found[name], true[name], within)
+        a, b = compared(found[name], true[name], _of(name, "area", area))
         centre_a, radius_a = _circles(a)
         centre_b, radius_b = _circles(b)
         scale = _scale(np.vstack([centre_a, centre_b]), a.crs)
@@ -133,10 +133,22 @@ def evaluate(
             raise ObstacleError("What a driver loses needs the field as area.")
         lost = Driving()
         for name in found:
-            lines = segments[name] if isinstance(segments, Mapping) else segments
-            ground = area[name] if isinstance(area, Mapping) else area
-            lost += driving(lines.to_crs(found[name].crs), found[name], active(true[name]), ground)
+            lines = _of(name, "segments", segments).to_crs(found[name].crs)
+            ground = _of(name, "area", area)
+            lost += driving(lines, found[name], active(true[name]), ground)
     return Evaluation(pooled, images, matches, distance_m, lost, dict(false_kinds))
+
+
+def _of(name: str, what: str, given: Any) -> Any:
+    """What is given for a picture: its own of a mapping, else the one of all."""
+    if not isinstance(given, Mapping):
+        return given
+    if name not in given:
+        raise ObstacleError(
+            f"There is no {what} of picture {name!r}." if name else f"{what} names pictures.",
+            hint=f"Give {what} as a mapping with all pictures that are compared, or one for all.",
+        )
+    return given[name]
 
 
 def compared(
