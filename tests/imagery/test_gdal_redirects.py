@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -78,3 +79,18 @@ def test_it_may_where_the_user_says_so(
     address = sent_on(server, f"{stranger.url}/own.tif")
     cut(address, "--allow", stranger.url, "-o", folder / "out.tif")
     assert stranger.was_called
+
+
+@pytest.mark.parametrize(
+    ("address", "host"),
+    [("http://127.0.0.1:9", "127.0.0.1"), ("https://nowhere.invalid", "nowhere.invalid")],
+)
+def test_a_server_that_does_not_answer_is_named_at_once(
+    tmp_path: Path, address: str, host: str
+) -> None:
+    """After 26 seconds the answer was "HTTP response code: 502"."""
+    begun = time.monotonic()
+    told = refused(cut(f"{address}/a.tif", "-o", tmp_path / "out.tif"), tmp_path / "out.tif")
+    assert f"a.tif cannot be read: {host} does not answer (" in told
+    assert "Check the address and the network." in told
+    assert time.monotonic() - begun < 13

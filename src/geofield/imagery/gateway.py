@@ -20,7 +20,7 @@ from urllib.request import getproxies, proxy_bypass
 
 from geofield.imagery.reach import Reach
 
-_TIMEOUT_S = 120.0
+_CONNECT_S, _TIMEOUT_S = 20.0, 120.0
 _BLOCK = 1 << 16
 #: Of one connection, not of the message (RFC 9110, 7.6.1).
 _HOP = frozenset(
@@ -38,6 +38,9 @@ class Gateway(ThreadingHTTPServer):
         super().__init__(("127.0.0.1", 0), _Handler)
         #: Addresses out of reach that were asked for.
         self.refused: list[str] = []
+        #: Why the last host that did not answer did not.
+        self.silent = ""
+        self._answered: set[str] = set()
         self._reaches: set[Reach] = set()
         self._proxies = getproxies()
         # curl would pass the gateway by for the hosts named there; Python still knows them.
@@ -58,17 +61,34 @@ class Gateway(ThreadingHTTPServer):
         self.refused.append(address)
         return False
 
-    def connection(self, scheme: str, host: str, port: int) -> http.client.HTTPConnection:
-        """A connection to a host, through the user's own proxy where there is one."""
+    def connected(self, scheme: str, host: str, port: int) -> http.client.HTTPConnection:
+        """A connection to a host, through the user's own proxy where there is one.
+
+        Raises
+        ------
+        OSError
+            Where there is no way to it.
+        """
         proxy = self._proxies.get(scheme)
         if not proxy or proxy_bypass(host):
-            return http.client.HTTPConnection(host, port, timeout=_TIMEOUT_S)
-        parts = urlsplit(proxy if "://" in proxy else f"http://{proxy}")
-        through = http.client.HTTPConnection(
-            parts.hostname or "", parts.port or 80, timeout=_TIMEOUT_S
-        )
-        through.set_tunnel(host, port)
+            through = http.client.HTTPConnection(host, port, timeout=_CONNECT_S)
+        else:
+            parts = urlsplit(proxy if "://" in proxy else f"http://{proxy}")
+            through = http.client.HTTPConnection(
+                parts.hostname or "", parts.port or 80, timeout=_CONNECT_S
+            )
+            through.set_tunnel(host, port)
+        through.connect()
+        through.sock.settimeout(_TIMEOUT_S)
+        self._answered.add(host)
+        self.silent = ""
         return through
+
+    def without(self, host: str, error: Exception) -> int:
+        """The status for a host that is silent: GDAL asks again only where it has answered."""
+        words = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        self.silent = f"{host} does not answer ({words.lower()})"
+        return 502 if host in self._answered else 403
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """GDAL closes connections as it likes."""
@@ -94,11 +114,10 @@ class _Handler(BaseHTTPRequestHandler):
         if not self.server.may(f"https://{self.path}"):
             self._refuse()
             return
-        connection = self.server.connection("https", host, int(port))
         try:
-            connection.connect()
-        except OSError:
-            self.send_error(502)
+            connection = self.server.connected("https", host, int(port))
+        except OSError as error:
+            self.send_error(self.server.without(host, error))
             return
         self.send_response(200)
         self.end_headers()
@@ -114,14 +133,14 @@ class _Handler(BaseHTTPRequestHandler):
         if parts.scheme != "http" or not parts.hostname or not self.server.may(self.path):
             self._refuse()
             return
-        connection = self.server.connection("http", parts.hostname, parts.port or 80)
         headers = {name: value for name, value in self.headers.items() if name.lower() not in _HOP}
         path = parts._replace(scheme="", netloc="").geturl() or "/"
         try:
+            connection = self.server.connected("http", parts.hostname, parts.port or 80)
             connection.request(self.command, path, headers=headers)
             answer = connection.getresponse()
-        except (OSError, http.client.HTTPException):
-            self.send_error(502)
+        except (OSError, http.client.HTTPException) as error:
+            self.send_error(self.server.without(parts.hostname, error))
             return
         self.send_response_only(answer.status, answer.reason)
         for name, value in answer.getheaders():

@@ -42,6 +42,7 @@ _DRIVERS = [
     *("ENVI", "EHdr", "AAIGrid"),
 ]
 
+_CHECK = "Check the address and the network."
 _REMOTE = re.compile(r"^(https?://|/vsicurl/|/vsis3/|s3://|gs://)", re.IGNORECASE)
 
 
@@ -131,7 +132,7 @@ def open_picture(path: str, reach: Reach = OWN_FOLDER, *, placed: bool = False) 
         raise ImageryError(
             f"The picture {name} cannot be opened: {reason(error, path)}.",
             hint=(
-                "Check the address and the network."
+                _CHECK
                 if is_remote(path)
                 else "It must be a raster file that GDAL reads (GeoTIFF, COG, VRT, JPEG 2000 ...), "
                 "unpacked from its archive; `gdalinfo` tells more."
@@ -151,16 +152,21 @@ def _unplaced_is_no_news() -> Iterator[None]:
 
 
 def _tell_refused(path: str, reach: Reach = OWN_FOLDER) -> None:
-    """Say which host a picture's server sends on to, where that is why it could not be read."""
+    """Say which host a picture's server sends on to, or which one is silent, where that is why."""
     if not is_remote(path) and not path.lower().endswith(".vrt"):
         return
     from geofield.imagery.gateway import gateway
 
-    refused = gateway().refused
+    refused, silent = gateway().refused, gateway().silent
+    gateway().silent = ""
     if refused:
         address = refused.pop()
         refused.clear()
         reach.of(path).require(address, f"The picture {display_name(path)}")
+    if silent:
+        raise ImageryError(
+            f"The picture {display_name(path)} cannot be read: {silent}.", hint=_CHECK
+        )
 
 
 def _drivers_for(path: str, reach: Reach) -> list[str]:
