@@ -13,7 +13,7 @@ import click
 
 from geofield.cli.console import echo_json, progress_bar, say, say_note
 from geofield.cli.field_notes import tell_farm
-from geofield.cli.files import OLD_FILE, PATH, claim_folder
+from geofield.cli.files import FARM, OLD_FILE, PATH, claim_folder
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import Number, acknowledge_option, stage_options, tell_idle
 from geofield.cli.parcels import place_options, places_of
@@ -49,6 +49,7 @@ Examples (the first one on the project's own sample):
     "--out",
     required=True,
     metavar="FARM",
+    type=FARM,
     help="Folder of the farm, or s3://BUCKET/FOLDER; where it is begun already, only what is "
     "missing is done.",
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from geofield.cli.console import say, say_note
-from geofield.cli.files import OLD_PATH, PATH, claim_folder, output_option, tell_unsaved
+from geofield.cli.files import FARM, OLD_PATH, PATH, claim_folder, output_option, tell_unsaved
 from geofield.errors import FormatError
 from geofield.staging import written_ns
 from geofield.wording import command, nearest
@@ -31,7 +31,7 @@ Example:
   geofield farm get farm/ field_1 -o field_1.gpkg
 """
 )
-@click.argument("folder", metavar="FARM")
+@click.argument("folder", metavar="FARM", type=FARM)
 @click.argument("field_id", metavar="ID")
 @output_option("GeoPackage.", PATH)
 @click.option("--overwrite", is_flag=True, help="Replace a file that is there already.")
@@ -91,7 +91,7 @@ Example:
 """
 )
 @click.argument("plan_file", metavar="PLAN", type=OLD_PATH)
-@click.argument("folder", metavar="FARM")
+@click.argument("folder", metavar="FARM", type=FARM)
 @click.option(
     "--anyway",
     is_flag=True,

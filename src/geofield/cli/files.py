@@ -46,6 +46,8 @@ class NamedPath(click.Path):
 PATH = NamedPath(path_type=Path)
 FILE = NamedPath(dir_okay=False, path_type=Path)
 FOLDER = NamedPath(file_okay=False, path_type=Path)
+#: The folder of a farm, which may lie in an object store.
+FARM = NamedPath(path_type=str)
 #: What must be there.
 OLD_PATH = NamedPath(exists=True, path_type=Path)
 OLD_FILE = NamedPath(exists=True, dir_okay=False, path_type=Path)
