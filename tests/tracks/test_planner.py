@@ -759,6 +759,12 @@ def test_a_headland_that_passes_do_not_fill_is_told() -> None:
         assert not plan_tracks(field, crs=CRS, spacing_m=3.0, headland_m=headland_m).notes
 
 
+def test_a_headland_of_more_passes_than_anybody_drives_is_refused() -> None:
+    """Of 9 500 passes it came to an end after a minute."""
+    with pytest.raises(TrackError, match=r"would take 1,050 passes of 0\.02 m; 1,000 are the most"):
+        plan_tracks(box(0, 0, 100, 60), crs=CRS, spacing_m=0.02, headland_m=21.0)
+
+
 @pytest.mark.parametrize("offset_m", [-1.0, np.nan, 121.0])
 def test_an_offset_outside_the_field_is_refused(offset_m):
     """It was taken modulo the spacing: the first track lay where nobody had said."""

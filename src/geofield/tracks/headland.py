@@ -23,6 +23,8 @@ _STANDS_OUT_M = 1e-3
 _FARTHER_M = np.array([0.0, 1e-4, 2e-4])
 #: What a headland is wider than its passes is not worth a word below this.
 _REST_M = 0.05
+#: No machine drives as many passes around a field; they take seconds by the thousand.
+_MOST_PASSES = 1000
 
 
 def inset(outline: Polygon, width: float, *, holes: bool = False) -> BaseGeometry:
@@ -113,6 +115,12 @@ def headland_track_table(
     cuts stays closed.
     """
     passes = _passes(width_m, spacing_m)
+    if passes > _MOST_PASSES:
+        raise TrackError(
+            f"A headland of {width_m:g} m would take {passes:,} passes of {spacing_m:.3g} m; "
+            f"{_MOST_PASSES:,} are the most.",
+            hint="Give the spacing in metres, for instance 3, or a narrower headland.",
+        )
     # In a headland narrower than half the machine, too, that stays within the border.
     last_m = max(first_m, width_m)
     offsets_m = [min(first_m + index * spacing_m, last_m) for index in range(passes)]
