@@ -35,6 +35,10 @@ def nearest(given: str, names: Iterable[str], cutoff: float = 0.6) -> str:
     return f" Did you mean {close[0]!r}?" if close else ""
 
 
+#: What exchanges latitude and longitude in a file of shapes.
+SWAP = 'ogr2ogr -ct "+proj=axisswap +order=2,1" NAME.gpkg FILE'
+
+
 def command(*words: str | Path) -> str:
     """A command of geofield that can be copied into a shell, whatever its paths are called.
 

@@ -46,6 +46,7 @@ from geofield.model.written import (
 )
 from geofield.plan import Plan
 from geofield.strangers import is_geopackage
+from geofield.wording import SWAP
 
 #: Outlines, in an array or a list.
 Shapes = Sequence[shapely.Geometry] | np.ndarray
@@ -179,7 +180,7 @@ def with_obstacles(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:
     if not near.any() and _swapped_here(standing, plan):
         raise TrackError(
             f"The obstacles lie at {plan.field.name} only with latitude and longitude swapped.",
-            hint="Exchange them in the file of obstacles: ogr2ogr -swapXY right.gpkg FILE",
+            hint=f"Exchange them in the file of obstacles: {SWAP}",
         )
     table = obstacle_table(mine[near].reset_index(drop=True), plan.field.crs, Path("obstacles"))
     reach = table.geometry.intersects(plan.field.polygon)

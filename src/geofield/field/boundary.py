@@ -18,12 +18,12 @@ from geofield.finite import MEND_IT, finite
 from geofield.model import Field, FieldQuality
 from geofield.model.own_values import first_of
 from geofield.notes import warn
-from geofield.wording import cell_text, counted, none_of
+from geofield.wording import SWAP, cell_text, counted, none_of
 
 if TYPE_CHECKING:
     import geopandas as gpd
 
-_EXCHANGE = "Exchange them in the file (`ogr2ogr -swapXY`)."
+_EXCHANGE = f"Exchange them in the file (`{SWAP}`)."
 #: Columns that name a parcel, in the order they are looked for.
 _NAME_COLUMNS = ("name", "Name", "NAME", "field_name", "field_id", "id", "fid")
 

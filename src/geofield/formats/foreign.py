@@ -29,7 +29,7 @@ from geofield.formats.sorting import RawLayer, sort_out
 from geofield.model import Dataset
 from geofield.notes import warn
 from geofield.strangers import check_vector, unreadable
-from geofield.wording import counted, without_shape
+from geofield.wording import SWAP, counted, without_shape
 
 if TYPE_CHECKING:
     import geopandas as gpd
@@ -218,6 +218,12 @@ def has_rows(path: Path, layer: str) -> bool:
     return bool(pyogrio.read_info(path, layer=layer, force_feature_count=True)["features"])
 
 
+def read_layers(path: Path, *, crs: CRS | None = None) -> Dataset:
+    """The dataset in all layers of a file that GDAL opens."""
+    layers = [RawLayer(name, read_vector(path, name)) for name in layer_names(path)]
+    return read_foreign(layers, path, crs=crs)
+
+
 def read_foreign(
     layers: list[RawLayer], path: Path, *, crs: CRS | None = None, name: str | None = None
 ) -> Dataset:
@@ -356,7 +362,8 @@ def _metric_of(layers: list[RawLayer]) -> CRS:
     if own.is_geographic and (abs(south) > 90 or abs(north) > 90):
         raise FormatError(
             f"Layer {layers[0].name!r} has latitudes from {south:.4f} to {north:.4f}.",
-            hint="Latitude and longitude may be swapped, or the CRS is not the one it says.",
+            hint=f"Latitude and longitude may be swapped (`{SWAP}`), or the "
+            "CRS is not the one it says (`ogr2ogr -a_srs EPSG:32633 NAME.gpkg FILE`).",
         )
     return metric_crs(float(lon), float(lat), own=own)
 

@@ -16,7 +16,7 @@ from pyproj import CRS
 from geofield import schema
 from geofield.errors import FormatError, FormatWarning
 from geofield.formats import origin
-from geofield.formats.foreign import RawLayer, layer_names, read_foreign, read_vector
+from geofield.formats.foreign import layer_names, read_layers, read_vector
 from geofield.formats.picture_beside import picture_beside
 from geofield.model import Dataset
 from geofield.model.evidence import Evidence
@@ -52,7 +52,7 @@ def read(path: Path) -> Dataset:
     record = record_of(path)
     layers = [name for name in layer_names(path) if name not in _NOT_LAYERS]
     if record is None:
-        return read_foreign([RawLayer(name, read_vector(path, name)) for name in layers], path)
+        return read_layers(path)
     tables: dict[str, gpd.GeoDataFrame] = {}
     crs = record.crs
     with database(path) as connection:

@@ -26,10 +26,22 @@ __all__ = [
 ]
 
 _TASK_DATA = b"ISO11783_TaskData"
+_SHEETS = (".xlsx", ".xls", ".ods")
 
 #: Every format by its name.
 FORMATS: Mapping[str, Format] = MappingProxyType({each.name: each for each in CATALOGUE})
 
+#: Of other programs, as GML and MapInfo: whatever GDAL finds shapes in is read, and never written.
+OTHER = Format(
+    "other",
+    "vector file of another program",
+    (),
+    (),
+    "",
+    "geofield.formats.foreign:read_layers",
+    asks_crs=True,
+    reads_folders=True,
+)
 #: What a file is called that some format reads.
 _READ = {suffix for each in CATALOGUE if each.reader for suffix in each.suffixes}
 
@@ -78,11 +90,22 @@ def detect(path: Path | str) -> Format:
     for each in FORMATS.values():
         if suffix in each.suffixes:
             return each
+    return _by_content(place)
+
+
+def _by_content(place: Path) -> Format:
+    """The format of a file whose suffix tells none."""
     if is_geopackage(place):
         return format_named("gpkg")
     if place.name in ("Field.txt", "Boundary.txt", "TrackLines.txt"):
         return format_named("agopengps")
     check_vector(place)
+    if _has_shapes(place):
+        return OTHER
+    if place.suffix.lower() in _SHEETS:
+        raise FormatError(
+            f"{place} is a spreadsheet.", hint="Save the sheet as a CSV file (UTF-8)."
+        )
     raise FormatError(
         f"The format of {place} is not known.",
         hint=f"Read are {', '.join(sorted(_READ))}. Of what else GDAL reads, `ogr2ogr NAME.gpkg "
@@ -182,9 +205,21 @@ def _detect_folder(folder: Path) -> Format:
     for each in FORMATS.values():
         if each.reader is not None and suffixes & set(each.suffixes):
             return each
+    if _has_shapes(folder):
+        return OTHER
     raise FormatError(
         f"{folder} holds no product that is known.", hint="Name one of its files instead."
     )
+
+
+def _has_shapes(place: Path) -> bool:
+    """Whether GDAL finds a layer with shapes in a file or folder, such as a file geodatabase."""
+    import pyogrio
+
+    try:
+        return any(kind is not None for _, kind in pyogrio.list_layers(place))
+    except pyogrio.errors.DataSourceError:
+        return False
 
 
 def _head(path: Path) -> bytes:

@@ -20,7 +20,7 @@ from geofield.errors import FormatError
 from geofield.formats.foreign import RawLayer, files_in, read_foreign
 from geofield.formats.raw_tables import RawTable, read_raw
 from geofield.model import Dataset
-from geofield.wording import nearest, some_of
+from geofield.wording import SWAP, nearest, some_of
 
 LAT = ("lat", "latitude")
 LON = ("lon", "lng", "long", "longitude")
@@ -149,9 +149,7 @@ def check_positions(raw: RawTable, lat: Any, lon: Any, row: Any, source: CRS) ->
     if swapped.all() and len(wrong) < np.isfinite(lat + lon).sum():
         hint = "Correct it there: latitude and longitude may be exchanged."
     elif swapped.all():
-        what = (
-            "the columns' names" if raw.geometry is None else "them in the file (`ogr2ogr -swapXY`)"
-        )
+        what = "the columns' names" if raw.geometry is None else f"them in the file (`{SWAP}`)"
         hint = f"Latitude and longitude look swapped: exchange {what}."
     elif len(wrong) < len(lat):
         hint = "Other rows are degrees: these may be in another CRS. Bring all rows into one."

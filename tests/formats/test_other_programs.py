@@ -1,0 +1,67 @@
+"""Files of other programs, made by GDAL: what it finds shapes in is read like all others."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import shutil
+import subprocess
+
+import geopandas as gpd
+import pytest
+import shapely
+
+from geofield.formats import read_dataset
+from geofield_command import run_geofield as geofield
+
+BOX = shapely.box(500_000, 5_500_000, 500_200, 5_500_100)
+TREES = [shapely.Point(500_100 + 9 * i, 5_500_050).buffer(3) for i in range(3)]
+DRIVERS = {"a.gml": "GML", "a.tab": "MapInfo File", "a.gdb": "OpenFileGDB", "a.sqlite": "SQLite"}
+
+
+@pytest.mark.parametrize("name", DRIVERS)
+def test_what_gdal_finds_shapes_in_is_imported_exported_and_checked(tmp_path, name):
+    frame = gpd.GeoDataFrame({"name": ["Große Äcker"]}, geometry=[BOX], crs="EPSG:32633")
+    file = tmp_path / "in" / name
+    file.parent.mkdir()
+    frame.to_file(file, driver=DRIVERS[name])
+    done = geofield("import", file, "-o", tmp_path / "plan.gpkg", "--json")
+    assert json.loads(done.stdout)["rows"] == {"field": 1}, done.stderr
+    field = read_dataset(tmp_path / "plan.gpkg").table("field")
+    assert field["name"].tolist() == ["Große Äcker"]
+    assert shapely.hausdorff_distance(field.geometry.iloc[0], BOX) < 0.01
+    assert geofield("validate", file).returncode == 0
+    assert "vector file of another program" in geofield("info", file).stdout
+
+
+def test_a_boundary_of_another_format_around_trees_of_a_usual_one(tmp_path):
+    gpd.GeoDataFrame(geometry=[BOX], crs="EPSG:32633").to_file(tmp_path / "a.gml", driver="GML")
+    gpd.GeoDataFrame(geometry=TREES, crs="EPSG:32633").to_file(tmp_path / "b.geojson")
+    files = tmp_path / "b.geojson", tmp_path / "a.gml"
+    done = geofield("import", *files, "-o", tmp_path / "plan.gpkg", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["rows"] == {"field": 1, "obstacles": 3}
+
+
+@pytest.mark.skipif(shutil.which("ogr2ogr") is None, reason="ogr2ogr is not installed")
+@pytest.mark.parametrize("command", ["import", "tracks"])
+def test_the_command_that_exchanges_latitude_and_longitude_does(tmp_path, command):
+    """ogr2ogr -swapXY was named; there is no such option."""
+    shape = shapely.box(36.14, 133.0, 36.143, 133.003)
+    file = tmp_path / "a.geojson"
+    gpd.GeoDataFrame(geometry=[shape], crs="EPSG:4326").to_file(file)
+    told = geofield(command, file, "-o", tmp_path / "plan.gpkg").stderr
+    words = shlex.split(re.search("`(ogr2ogr -ct .*?)`", told)[1])
+    put = {"NAME.gpkg": tmp_path / "b.gpkg", "FILE": file}
+    subprocess.run([put.get(word, word) for word in words], check=True)
+    done = geofield(command, tmp_path / "b.gpkg", "-o", tmp_path / "plan.gpkg")
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_spreadsheet_is_to_be_saved_as_csv(tmp_path):
+    (tmp_path / "trees.xlsx").write_bytes(b"PK\3\4" + bytes(60))
+    done = geofield("import", tmp_path / "trees.xlsx", "-o", tmp_path / "plan.gpkg")
+    assert done.returncode == 1
+    assert "is a spreadsheet." in done.stderr
+    assert "Save the sheet as a CSV file" in done.stderr
