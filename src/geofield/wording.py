@@ -39,6 +39,10 @@ def nearest(given: str, names: Iterable[str], cutoff: float = 0.6) -> str:
 SWAP = 'ogr2ogr -ct "+proj=axisswap +order=2,1" NAME.gpkg FILE'
 
 
+#: The next step where a file does not say its CRS.
+NAME_CRS = "Name it: --crs EPSG:4326 for degrees, or, for instance, EPSG:32633 (UTM zone 33 north)."
+
+
 def command(*words: str | Path) -> str:
     """A command of geofield that can be copied into a shell, whatever its paths are called.
 

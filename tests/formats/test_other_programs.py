@@ -65,3 +65,25 @@ def test_a_spreadsheet_is_to_be_saved_as_csv(tmp_path):
     assert done.returncode == 1
     assert "is a spreadsheet." in done.stderr
     assert "Save the sheet as a CSV file" in done.stderr
+
+
+def test_coordinates_outside_their_crs_are_told_by_file_and_layer(tmp_path):
+    """With a zone's number before the easting: "lon inf, lat inf is not a place on earth"."""
+    far = "+proj=tmerc +lat_0=0 +lon_0=33 +k=0.9996 +x_0=36500000 +ellps=GRS80 +units=m"
+    file = tmp_path / "a.shp"
+    gpd.GeoDataFrame(geometry=[BOX], crs=far).to_file(file)
+    done = geofield("import", file, "-o", tmp_path / "plan.gpkg")
+    assert done.returncode == 1
+    assert "Coordinates of layer 'a' are outside the area of" in done.stderr
+    assert "Check the CRS" in done.stderr
+
+
+def test_what_tracks_says_of_metres_without_a_crs_and_of_lines(tmp_path):
+    gpd.GeoDataFrame(geometry=[BOX], crs="EPSG:32633").to_file(tmp_path / "a.shp")
+    (tmp_path / "a.prj").unlink()
+    done = geofield("tracks", tmp_path / "a.shp", "-o", tmp_path / "plan.gpkg")
+    assert "EPSG:4326 for degrees, or, for instance, EPSG:32633" in done.stderr
+    ring = shapely.LineString(BOX.exterior.coords)
+    gpd.GeoDataFrame(geometry=[ring], crs="EPSG:32633").to_file(tmp_path / "b.shp")
+    done = geofield("tracks", tmp_path / "b.shp", "-o", tmp_path / "plan.gpkg")
+    assert "QGIS makes parcels of closed lines" in done.stderr

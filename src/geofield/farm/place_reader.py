@@ -27,7 +27,7 @@ from geofield.formats.raw_tables import RawTable, raw_of, read_raw
 from geofield.formats.table_positions import LAT, LON, check_positions, degrees, found
 from geofield.model.place import position_words
 from geofield.settings import Settings
-from geofield.wording import cell_text, counted, unlike
+from geofield.wording import NAME_CRS, cell_text, counted, unlike
 
 _BATCH = 50_000
 
@@ -121,9 +121,7 @@ def _crs_of(raw: RawTable, crs: str | None) -> CRS:
     if raw.crs is None and crs is None and raw.in_degrees:
         return LONLAT
     if raw.crs is None and crs is None:
-        raise CRSError(
-            f"{raw.name} does not say its CRS.", hint="Name it: --crs EPSG:4326, for instance."
-        )
+        raise CRSError(f"{raw.name} does not say its CRS.", hint=NAME_CRS)
     own = None if raw.crs is None else parse_crs(raw.crs)
     given = own if crs is None else parse_crs(crs)
     if own is not None and given is not None and not own.equals(given, ignore_axis_order=True):
@@ -170,7 +168,9 @@ def _shapes(raw: RawTable, geometry: pa.Array, source: CRS, notes: list[str]) ->
     rows, parts = np.concatenate(kept), np.concatenate(part)
     if not len(rows):
         raise FormatError(
-            f"{raw.name} holds no points and no polygons.", hint="Give a point or a parcel a row."
+            f"{raw.name} holds no points and no polygons.",
+            hint="Give a point or a parcel a row (QGIS makes parcels of closed lines: Lines to "
+            "polygons).",
         )
     if parts.any():
         of_parts = len(np.unique(rows[parts > 0]))

@@ -46,7 +46,7 @@ from geofield.model.written import (
 )
 from geofield.plan import Plan
 from geofield.strangers import is_geopackage
-from geofield.wording import SWAP
+from geofield.wording import NAME_CRS, SWAP
 
 #: Outlines, in an array or a list.
 Shapes = Sequence[shapely.Geometry] | np.ndarray
@@ -92,9 +92,7 @@ def _read(path: Path, crs: str | None, _stamp: tuple[tuple[int, int], ...]) -> g
     frame, layers = _rows_and_layers(path)
     if frame.crs is None:
         if crs is None:
-            raise CRSError(
-                f"{path} does not say its CRS.", hint="Name it: --crs EPSG:4326, for instance."
-            )
+            raise CRSError(f"{path} does not say its CRS.", hint=NAME_CRS)
         frame = frame.set_crs(parse_crs(crs))
     if column_like(frame, NUMBER_COLUMNS) is None:
         frame = frame.assign(obstacle_no=np.arange(1, len(frame) + 1))

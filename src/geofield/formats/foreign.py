@@ -19,7 +19,7 @@ from pyproj.exceptions import ProjError
 from shapely.errors import GEOSException
 
 from geofield import schema
-from geofield.crs import LONLAT, metric_crs, parse_crs, transformer
+from geofield.crs import LONLAT, metric_crs, parse_crs, refuse_outside, transformer
 from geofield.errors import EmptyFileError, FormatError, FormatWarning, SeveralFieldsError
 from geofield.finite import refuse_nowhere
 from geofield.formats.antimeridian import joined, unwrapped
@@ -365,6 +365,7 @@ def _metric_of(layers: list[RawLayer]) -> CRS:
             hint=f"Latitude and longitude may be swapped (`{SWAP}`), or the "
             "CRS is not the one it says (`ogr2ogr -a_srs EPSG:32633 NAME.gpkg FILE`).",
         )
+    refuse_outside(own, lon, lat, what=f"Coordinates of layer {layers[0].name!r}")
     return metric_crs(float(lon), float(lat), own=own)
 
 
