@@ -234,6 +234,35 @@ def test_the_row_that_is_chosen_is_not_below_the_buttons(page: Page, size: tuple
         assert bottom <= panel + 1
 
 
+@pytest.mark.parametrize("size", [(390, 844), (320, 256), (320, 568), (640, 360)])
+def test_nothing_lies_over_another_part_and_a_touch_moves_none(
+    page: Page, size: tuple[int, int]
+) -> None:
+    """The line below grew a second row at the first touch, and lay over the tools at 320 x 256."""
+    given = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": True}
+    page.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", given)
+    page.driver.refresh()
+    page.wait(lambda: page.run("return document.body.dataset.ready"))
+    time.sleep(0.3)
+    boxes = (
+        "return ['header', '#tools', '#map', '#panel', 'footer'].map(query => {"
+        " const box = document.querySelector(query).getBoundingClientRect();"
+        " return [box.left, box.top, box.right, box.bottom]; });"
+    )
+    page.run("document.getElementById('map').scrollIntoView()")
+    parts = page.run(boxes)
+    for number, (left, top, right, bottom) in enumerate(parts):
+        assert bottom - top > 20
+        for other in parts[number + 1 :]:
+            assert left >= other[2] or other[0] >= right or top >= other[3] or other[1] >= bottom
+    left, top, right, bottom = parts[2]
+    assert bottom - top > 140
+    x, y = (left + right) / 2, (top + bottom) / 2
+    Fingers(page.driver).move(((x, y), (x + 20, y + 20)))
+    assert page.text("place")
+    assert page.run(boxes) == parts
+
+
 def test_what_stays_until_it_is_answered_covers_no_button(page: Page, plan_path: Path) -> None:
     """Below the words about another program nothing could be confirmed any more."""
     size = {"width": 360, "height": 740, "deviceScaleFactor": 2, "mobile": True}
