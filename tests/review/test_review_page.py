@@ -465,6 +465,22 @@ def test_an_empty_plan_has_no_dead_buttons_and_a_telephone_shows_the_whole_field
         driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
+def test_counts_are_right_for_one(driver: webdriver.Chrome, plan_path: Path) -> None:
+    """The page said "1 of 1 wait" and "All 1 have a person's word"."""
+    plan = read_plan(plan_path)
+    assert plan.obstacles is not None
+    alone = replace(
+        plan, obstacles=plan.obstacles.iloc[:1], evidence=replace(plan.evidence, written=None)
+    )
+    save_plan(Session(replace(alone, tracks=None)).plan, plan_path, read_from=plan_path)
+    with served(plan_path) as (address, _):
+        page = Page(driver, address)
+        assert page.text("left") == "Waiting for your word: 1 of 1"
+        page.press("j", "c")
+        page.wait(lambda: page.text("left") == "Waiting for your word: 0 of 1")
+        page.run("window.onbeforeunload = null")
+
+
 def test_what_was_dragged_off_the_picture_goes_back(page: Page) -> None:
     before = page.obstacle(8)
     page.run("document.querySelector('#list [data-no=\"8\"]').click()")
@@ -936,7 +952,7 @@ def test_german_words_and_keys_switched_off(page: Page) -> None:
     box.clear()
     box.send_keys("5000", Keys.ENTER)
     page.wait(lambda: "5000 m ist größer als das Feld" in page.text("message"))
-    assert "warten auf Ihr Wort" in page.text("left")
+    assert page.text("left") == "Noch ohne Ihr Wort: 21 von 21"
     for name, typed, told in (
         ("spacing_m", "0", "Der Abstand ist eine Zahl in Metern über 0, nicht 0."),
         ("headland_m", "900", "Ein Vorgewende von 900 m lässt nichts vom Feld übrig. Wählen Sie"),

@@ -41,7 +41,7 @@ view.fit(shown.outline.getSource().getExtent(), {padding: [30, 30, 30, 30]});
 
 function describe(feature, name) {
   if (name === "obstacle") {
-    const row = feature.get("row"), size = row.radius_m === null ? t("other") : `${number(row.radius_m, 1)} m`;
+    const row = feature.get("row"), size = row.radius_m === null ? t("other") : t("radius", {m: number(row.radius_m, 1)});
     const rows = [`${t("obstacle")} ${row.no}`, t(row.status), `${t(row.kind)}, ${size}`];
     if (row.confidence !== null) rows.push(`${number(100 * row.confidence)} %`);
     if (row.lost_m) rows.push(t("lost", {m: number(row.lost_m)}));

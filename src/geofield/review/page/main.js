@@ -106,7 +106,7 @@ function showTracks(answer, moving = false) {
   const unfit = f.turns_that_do_not_fit ? ` · ${t("unfit", {n: f.turns_that_do_not_fit})}` : "";
   const waits = answer.route_waits ?? state.settings.route !== "none" ? ` · ${t("route_waits")}` : "";
   $("figures").textContent = `${number(f.area_ha, 2)} ha · ${t(f.tracks === 1 ? "one_track" : "n_tracks", {n: f.tracks})} · ${number(f.length_m / 1000, 2)} km · ${t("covered", {p: number(f.coverage_percent, 1)})}${unfit}${waits}`;
-  const facts = [["area", `${number(f.area_ha, 4)} ha`], ["length", `${f.tracks} (${f.segments}), ${number(f.length_m)} m`],
+  const facts = [["area", `${number(f.area_ha, 4)} ha`], ["length", `${f.tracks}, ${number(f.length_m)} m`], ["segments", number(f.segments)],
     ["coverage", `${number(f.coverage_percent, 1)} %`], ["overlap", `${number(f.overlap_percent, 1)} %`],
     ["heading", heading(f.heading_deg)], ["lost_all", `${number(f.lost_m)} m`]];
   if (f.turns !== null) facts.push(["turns", number(f.turns)]);
@@ -146,15 +146,15 @@ function ordered() {
 
 function showList() {
   const all = state.obstacles.length, left = state.obstacles.filter(waits).length;
-  $("left").textContent = !all ? t(state.detected_from === null ? "unsearched" : "no_obstacles") : left ? t("left", {n: left, all}) : t("none_left", {all});
+  $("left").textContent = !all ? t(state.detected_from === null ? "unsearched" : "no_obstacles") : t("left", {n: left, all});
   const focused = document.activeElement?.dataset?.no;
   $("list").replaceChildren(...ordered().map(each => {
     const item = document.createElement("li"), press = document.createElement("button");
     press.dataset.no = each.no;
-    const size = each.radius_m === null ? t("other") : `${number(each.radius_m, 1)} m`;
+    const size = each.radius_m === null ? t("other") : t("radius", {m: number(each.radius_m, 1)});
     const sure = each.confidence === null ? "" : ` · ${number(100 * each.confidence)} %`;
     const cost = each.lost_m ? ` · ${t("lost", {m: number(each.lost_m)})}` : "";
-    press.append(node("b", each.no), node("span", `${t(each.status)}`), node("small", `${size}${sure}${cost}`));
+    press.append(node("b", each.no), node("span", t(each.status)), node("small", `${size}${sure}${cost}`));
     press.onclick = () => inTurn(() => row(each.no) && choose(each.no, true));
     item.append(press);
     return item;
