@@ -5,7 +5,7 @@ import {keyName, t} from "./web/words.js";
 const KEYS = [
   ["j", "k_next", a => a.next()], ["k", "k_prev", a => a.previous()], ["c", "k_confirm", a => a.confirm()],
   ["r", "k_reject", a => a.reject()], ["u", "k_reset", a => a.reset()], ["a", "k_add", a => a.tool("circle")], ["Enter", "k_here", a => a.here()],
-  ["m", "k_move", a => a.tool("select")], ["[", "k_size", a => a.smaller()], ["]", "k_size", a => a.larger()],
+  ["m", "k_move", a => a.tool("select")], ["[", "k_smaller", a => a.smaller()], ["]", "k_larger", a => a.larger()],
   ["o", "k_outline", a => a.tool("outline")],
   ["g", "k_ground", a => a.tool("ground")], ["x", "k_notground", a => a.tool("notground")], ["Delete", "k_delete", a => a.remove()],
   ["n", "k_onward", a => a.onward()], ["?", "k_help", a => a.help()], ["Escape", "k_esc", a => a.escape()],
@@ -33,7 +33,9 @@ export function listen(actions) {
     if (control && key.toLowerCase() === "z") return done(event.shiftKey ? actions.redo : actions.undo);
     if (control && key.toLowerCase() === "y") return done(actions.redo);
     if (control || (event.altKey && !BRACKETS.includes(key))) return;
-    if (!document.getElementById("keys-on").checked && key !== "Escape") return;
+    // Letters are what may be switched off; the map itself has arrows, Enter and Del all the same.
+    const onMap = event.target.id === "map";
+    if (!document.getElementById("keys-on").checked && key !== "Escape" && !(onMap && key.length > 1)) return;
     if (key in ARROWS) {
       if (event.target.matches?.("input[type=range]")) return;
       const metres = event.shiftKey ? 0.1 : 0.5, [x, y] = ARROWS[key];
@@ -41,7 +43,7 @@ export function listen(actions) {
       return;
     }
     // Buttons and lists have their own use for it.
-    if (key === "Enter" && event.target.id !== "map") return;
+    if (key === "Enter" && !onMap) return;
     const found = KEYS.find(([name]) => name === key || (name.length === 1 && name === key.toLowerCase()));
     if (found) done(() => (event.repeat && !ON_AND_ON.includes(found[0])) || found[2](actions));
   }, true);

@@ -254,7 +254,7 @@ function takeBack() {
 // Where there is nothing to undo, nothing was undone.
 const through = way => inTurn(() => state[`can_${way}`] && make({do: way}));
 const ifChosen = work => inTurn(() => chosen !== null && work(chosen));
-const nudge = (dx, dy) => chosen !== null && ifChosen(no => make({do: "move", no, dx_m: dx, dy_m: dy}));
+const nudge = (dx, dy) => tools.nudgeCorner(dx, dy) ?? (chosen !== null && ifChosen(no => make({do: "move", no, dx_m: dx, dy_m: dy})));
 
 function resize(factor) {
   const each = row(chosen);
@@ -292,11 +292,11 @@ const save = name => applied(() => act(() => api.save(name), answer => {
 }));
 
 const ACTIONS = {
-  next: () => inTurn(() => step(true)), previous: () => inTurn(() => step(false)),
+  next: () => tools.stepCorner(1) || inTurn(() => step(true)), previous: () => tools.stepCorner(-1) || inTurn(() => step(false)),
   confirm: () => inTurn(() => verdict("confirmed")), reject: () => inTurn(() => verdict("rejected")),
   reset: () => inTurn(takeBack), undo: () => through("undo"), redo: () => through("redo"), save: () => save(),
   help: () => $("keys").showModal(), more: () => $("menu").showModal(), smaller: () => inTurn(() => resize(1 / 1.1)), larger: () => inTurn(() => resize(1.1)),
-  remove: () => tools.removeCorner() || ifChosen(no => make({do: "delete", no})), tool: name => { tools.use(name); speak(t(`t_${name}`)); }, here: tools.addHere, nudge,
+  remove: () => tools.removeCorner() || ifChosen(no => make({do: "delete", no})), tool: name => { tools.use(name); speak(t(`t_${name}`)); }, here: tools.clickHere, nudge,
   busy: () => undone > 0, onward: () => goTo((state.plan + 1) % state.plans.length),
   escape: () => { if (tools.current() === "select") inTurn(() => choose(null)); tools.use("select"); },
 };
@@ -338,7 +338,7 @@ async function start() {
   show(state);
   // On a telephone it would lie below the list, unseen.
   if ($("doubts").hasChildNodes()) $("panel").prepend($("outline-h").parentElement);
-  tools.begin({chosen: () => chosen, row, choose: (no, zoom) => inTurn(() => choose(no, zoom)), commit, again: () => show({}), showTracks, refused, explain: word => say(t(word)), scale: () => state.scale,
+  tools.begin({chosen: () => chosen, row, choose: (no, zoom) => inTurn(() => choose(no, zoom)), commit, inTurn, make, speak: (word, values) => speak(t(word, values)), again: () => show({}), showTracks, refused, explain: word => say(t(word)), scale: () => state.scale,
     measured: text => { $("measure").textContent = text; }, changed: pressed});
   words();
   listen(ACTIONS);

@@ -37,6 +37,7 @@ export function build(state, chosen) {
   add("sketch", symbols.cased(state.theme.outline, 2, [6, 6]));
   // The page is the map: it moves whatever has the focus.
   const interactions = ol.interaction.defaults.defaults({onFocusOnly: false, altShiftDragRotate: false, pinchRotate: false});
+  interactions.push(new ol.interaction.KeyboardPan({pixelDelta: 8, duration: 0, condition: ol.events.condition.shiftKeyOnly}));
   // A hand that trembles while it clicks moves nothing.
   map = new ol.Map({target: "map", moveTolerance: 4, layers, view, interactions, controls: ol.control.defaults.defaults({rotate: false, attribution: false, zoomOptions: {zoomInTipLabel: "", zoomOutTipLabel: ""}})
     .extend([new ol.control.ScaleLine({minWidth: 90})]), keyboardEventTarget: document.getElementById("map")});
@@ -128,6 +129,11 @@ export function showHandle(row) {
   // On a small circle the handle would lie over its middle, by which it is moved.
   if (reach / view.getResolution() < 24) return;
   sources.handle.addFeature(new ol.Feature({geometry: new ol.geom.Point([x + reach, y])}));
+}
+
+export function showCorner(place) {
+  sources.handle.clear(true);
+  sources.handle.addFeature(new ol.Feature(new ol.geom.Point(place)));
 }
 
 export function obstacleAt(pixel) {

@@ -6,13 +6,13 @@ import {preview, endPreview} from "./api.js";
 export const TOOLS = ["select", "circle", "polygon", "ground", "notground", "outline", "anew", "direction", "measure"];
 // What is done by a drag; the others take clicks, and two fingers between them.
 const DRAGGED = ["select", "circle", "outline", "direction"];
-let desk, touched = null, active = "select", held = [];
+let desk, touched = null, active = "select", held = [], way = [];
 // Pixels around a thing that count as the thing: fingers are wide.
 const reach = matchMedia("(pointer: coarse)").matches ? 16 : 6;
 const at = coordinate => coordinate.map(value => Math.round(value * 1000) / 1000);
 const ring = geometry => geometry.getCoordinates()[0].slice(0, -1).map(at);
 
-// `desk`: {chosen(), row(no), choose(no), commit(command), again(), showTracks(answer, moving), refused(error), explain(word), measured(text), changed()}
+// `desk`: {chosen(), row(no), choose(no), commit(command), inTurn(work), make(command), again(), showTracks(answer, moving), refused(error), explain(word), speak(word, values), measured(text), scale(), changed()}
 export function begin(given) {
   desk = given;
   maps.map.on("singleclick", event => {
@@ -35,35 +35,98 @@ export function begin(given) {
   use("select");
 }
 
-// The corner that was touched last: fingers have no Alt key.
-export function removeCorner() {
-  if (active !== "outline") return false;
-  const rings = ringsOf(maps.sources.outline.getFeatures()[0]), near = 16 * maps.view.getResolution();
+// The corner that was touched last: fingers have no Alt key, and keys go from one to the next.
+function corner() {
+  const near = 16 * maps.view.getResolution();
   let best = null;
-  rings.forEach((places, ring) => places.forEach(([x, y], corner) => {
-    const away = touched ? Math.hypot(x - touched[0], y - touched[1]) : Infinity;
-    if (away < near && (!best || away < best.away)) best = {away, ring, corner};
-  }));
-  if (best) {
-    const left = rings.map((places, ring) => places.filter((_, i) => ring !== best.ring || i !== best.corner));
-    // A hole of three corners goes as a whole; of the field itself three must stay, which the server tells.
-    commit({do: "outline", rings: left.filter((places, ring) => ring === 0 || places.length > 2)});
+  for (const one of corners()) {
+    const away = touched ? Math.hypot(one.place[0] - touched[0], one.place[1] - touched[1]) : Infinity;
+    if (away < near && (!best || away < best.away)) best = {...one, away};
   }
+  return best;
+}
+
+const corners = () => outline().flatMap((places, ring) => places.map((place, index) => ({place, ring, index})));
+
+// The outline with other places than a corner; it is the one that the last answer has left.
+const reshape = places => desk.inTurn(async () => {
+  const one = corner(), rings = outline();
+  if (!one) return;
+  const put = places(one);
+  rings[one.ring].splice(one.index, 1, ...put);
+  // A hole of three corners goes as a whole; of the field itself three must stay, which the server tells.
+  const made = await desk.make({do: "outline", rings: rings.filter((left, ring) => ring === 0 || left.length > 2)});
+  if (made && put.length) take(put.at(-1));
+});
+
+export function removeCorner() {
+  if (active === "outline") reshape(() => []);
+  return active === "outline";
+}
+
+// Where the map has the focus, the keys that speak of obstacles speak of the corners of an outline that is edited.
+const ofCorners = () => active === "outline" && document.activeElement === maps.map.getTargetElement();
+
+function take(place) {
+  touched = place;
+  maps.view.setCenter(place);
+  maps.showCorner(place);
+}
+
+export function stepCorner(by) {
+  if (!ofCorners()) return false;
+  const all = corners(), here = corner(), before = here ? all.findIndex(one => one.ring === here.ring && one.index === here.index) : Math.min(0, -by);
+  const n = (before + by + all.length) % all.length;
+  take(all[n].place);
+  desk.speak("corner", {n: n + 1, all: all.length});
   return true;
 }
 
-// A circle without a pointer: in the middle of the map, to be moved and sized by keys.
-export function addHere() {
-  const [x, y] = at(maps.view.getCenter());
-  if (active === "circle") commit({do: "circle", x, y, radius_m: 2});
+// Whether an arrow key moves a corner (true) or the map (false); else it is for the chosen obstacle.
+export function nudgeCorner(dx_m, dy_m) {
+  if (document.activeElement !== maps.map.getTargetElement() || ["select", "circle"].includes(active)) return null;
+  if (active !== "outline" || !corner()) return false;
+  reshape(({place: [x, y]}) => [at([x + dx_m / desk.scale(), y + dy_m / desk.scale()])]);
+  return true;
 }
 
+// Without a pointer: a click in the middle of the map.
+export function clickHere() {
+  const place = at(maps.view.getCenter()), [x, y] = place;
+  if (active === "select") desk.choose(maps.obstacleAt(maps.map.getPixelFromCoordinate(place)), false);
+  else if (active === "circle") commit({do: "circle", x, y, radius_m: 2});
+  else if (active === "outline") addCorner(place);
+  else if (held.length) drawTo(place, held[0]);
+  else commit({do: "ground", place, belongs: active === "ground"});
+}
+
+// In the side that is nearest.
+function addCorner(place) {
+  const away = ({ring, index, place: from}) => ol.coordinate.squaredDistanceToSegment(place, [from, outline()[ring].at((index + 1) % outline()[ring].length)]);
+  touched = corners().reduce((best, one) => away(one) < away(best) ? one : best).place;
+  reshape(({place: from}) => [from, place]);
+}
+
+// Once more at the same place ends a shape, as a double click does; two places give a direction.
+function drawTo(place, draw) {
+  const last = String(place) === String(way.at(-1));
+  if (!last) {
+    draw.appendCoordinates([place]);
+    desk.speak("corner", {n: way.push(place), all: way.length});
+  }
+  if (active === "direction" ? way.length < 2 : !last || way.length < (active === "measure" ? 2 : 3)) return;
+  way = [];
+  draw.finishDrawing();
+}
+
+const outline = () => ringsOf(maps.sources.outline.getFeatures()[0]);
 const ringsOf = feature => feature.getGeometry().getCoordinates().map(part => part.slice(0, -1).map(at));
 
 export const current = () => active;
 
 export function use(name) {
   active = name;
+  way = [];
   rest();
   desk.measured("");
   held = MAKERS[name]();
