@@ -46,6 +46,8 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
     own : set of str
         Parameters of the command that the algorithm gives itself; all others are asked for as
         the command describes them.
+    product : str
+        The plan in the folder OUTPUT; nothing where OUTPUT is the plan itself.
     """
 
     identifier = ""
@@ -54,6 +56,7 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
     command = ""
     own: frozenset[str] = frozenset({"as_json"})
     makes_plan = False
+    product = ""
     fine: tuple[int, ...] = (0,)
 
     # -- what QGIS asks ----------------------------------------------------------------------
@@ -128,6 +131,8 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
         try:
             with tempfile.TemporaryDirectory(prefix="geofield_qgis_") as folder:
                 values = self._placed(values, context)
+                if self.makes_plan:
+                    self.refuse_editing(self.written_plan(values, context), context)
                 words, environment = self.words(values, context, feedback, folder)
                 rows = self.rows()
                 environment = {**parameters.unsaid(rows), **environment}
@@ -181,9 +186,10 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
     def outputs(
         self, result: engine.Result, values: Any, context: Any, feedback: Any
     ) -> dict[str, Any]:
-        """What the command made: the plan in the GeoPackage OUTPUT, unless it says otherwise."""
-        path = self.parameterAsString(values, "OUTPUT", context)
-        return {"OUTPUT": path, **self.plan_outputs(path, values, context)}
+        """What the command made: the plan, unless it says otherwise."""
+        plan = self.written_plan(values, context)
+        output = self.parameterAsString(values, "OUTPUT", context)
+        return {"OUTPUT": output, **self.plan_outputs(plan, values, context)}
 
     # -- parts that several use --------------------------------------------------------------
 
@@ -276,10 +282,20 @@ class GeofieldAlgorithm(QgsProcessingAlgorithm):
 
     def refuse_unsaved_plan(self, path: str, context: Any) -> None:
         """Refuse a plan while any of its layers has edits that lie in no file yet."""
-        path = str(results.settled(path))
-        for layer in (context.project() or QgsProject.instance()).mapLayers().values():
-            if path_of(layer) == path:
-                sources.refuse_unsaved(layer)
+        for layer in _layers_of(path, context):
+            sources.refuse_unsaved(layer)
+
+    def refuse_editing(self, path: str, context: Any) -> None:
+        """Refuse to write a plan while any of its layers is edited: QGIS holds its file then."""
+        for layer in _layers_of(path, context):
+            sources.refuse_unsaved(layer)
+            if isinstance(layer, QgsVectorLayer) and layer.isEditable():
+                told = tr("The layer {0} is being edited: end that first, its file is replaced.")
+                raise engine.EngineError(told.format(layer.name()))
+
+    def written_plan(self, values: Any, context: Any) -> str:
+        """The GeoPackage that the command writes."""
+        return str(Path(self.parameterAsString(values, "OUTPUT", context)) / self.product)
 
     def add_geopackage(self) -> None:
         """A GeoPackage for a plan, as OUTPUT."""
@@ -312,6 +328,12 @@ def path_of(layer: Any) -> str:
     decoded = QgsProviderRegistry.instance().decodeUri(layer.providerType(), layer.source())
     path = str(decoded.get("path") or "")
     return str(results.settled(path)) if path else ""
+
+
+def _layers_of(path: str, context: Any) -> list[Any]:
+    path = str(results.settled(path))
+    layers = (context.project() or QgsProject.instance()).mapLayers().values()
+    return [each for each in layers if path_of(each) == path]
 
 
 def _progress_of(feedback: Any) -> Any:

@@ -41,7 +41,7 @@ class PlanAlgorithm(GeofieldAlgorithm):
 
     identifier, title, section, command = "plan", "Plan a field", FIELD, "run"
     own = GeofieldAlgorithm.own | {"imagery", "lat", "lon", "out", "boundary", "boundary_layer"}
-    makes_plan = True
+    makes_plan, product = True, "field.gpkg"
 
     def add_inputs(self) -> None:
         """Picture, point and folder."""
@@ -60,14 +60,6 @@ class PlanAlgorithm(GeofieldAlgorithm):
         words += self.source_words("BOUNDARY", "--boundary", values, context, feedback, folder)
         return words, environment
 
-    def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
-        """See GeofieldAlgorithm."""
-        folder = self.parameterAsString(values, "OUTPUT", context)
-        return {
-            "OUTPUT": folder,
-            **self.plan_outputs(Path(folder) / "field.gpkg", values, context),
-        }
-
 
 class ManyFieldsAlgorithm(GeofieldAlgorithm):
     """Any number of fields into one farm."""
@@ -77,7 +69,7 @@ class ManyFieldsAlgorithm(GeofieldAlgorithm):
         "places", "imagery", "out", "obstacle_file", "layer", "places_crs", "lat_column",
         "lon_column", "overview", "scheduler",
     }  # fmt: skip
-    makes_plan = True
+    makes_plan, product = True, "farm.gpkg"
 
     def add_inputs(self) -> None:
         """Points or parcels, picture and folder."""
@@ -109,12 +101,10 @@ class ManyFieldsAlgorithm(GeofieldAlgorithm):
 
     def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
         """See GeofieldAlgorithm."""
-        folder = self.parameterAsString(values, "OUTPUT", context)
         counts = result.data or {}
         return {
-            "OUTPUT": folder,
             "FIELDS": sum(counts.get(name, 0) for name in ("done", "doubtful")),
-            **self.plan_outputs(Path(folder) / "farm.gpkg", values, context),
+            **super().outputs(result, values, context, feedback),
         }
 
 
@@ -208,6 +198,11 @@ class TracksAlgorithm(GeofieldAlgorithm):
         Path(output).mkdir(parents=True, exist_ok=True)
         # What the dialog shows holds, not what a plan was made with.
         return [*words, "-o", output, "--each", *obstacles, "--defaults", "--json"], {}
+
+    def written_plan(self, values: Any, context: Any) -> str:
+        """The plan itself keeps its name; parcels are called by theirs, which the command knows."""
+        plan = sources.plan_file(self.source_layer("INPUT", values, context))
+        return str(Path(super().written_plan(values, context)) / Path(plan or "").name)
 
     def outputs(self, result: Any, values: Any, context: Any, feedback: Any) -> dict[str, Any]:
         """See GeofieldAlgorithm."""

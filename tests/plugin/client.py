@@ -62,9 +62,9 @@ def layer_of(what):
         assert layer.setSubsetString(what["filter"])
     if what.get("select"):
         layer.selectByExpression(what["select"])
-    if what.get("edit"):
+    if "edit" in what:  # so many rows are deleted
         layer.startEditing()
-        layer.deleteFeature(next(layer.getFeatures()).id())
+        layer.deleteFeatures([each.id() for each in layer.getFeatures()][: what["edit"]])
     QgsProject.instance().addMapLayer(layer)
     return layer
 

@@ -358,6 +358,35 @@ def test_layers_come_styled_in_their_group(qgis, sample_plan, tmp_path):
     assert answer["loose"] == []
 
 
+@pytest.mark.parametrize("edits", [0, 1])
+@pytest.mark.parametrize(
+    "algorithm", ["plan", "outline", "obstacles", "tracks", "route", "import", "batch"]
+)
+def test_a_plan_that_is_edited_is_not_written(qgis, plan, tmp_path, algorithm, edits):
+    """That QGIS holds its file was told when all the work was done."""
+    shutil.copytree(plan, tmp_path / "own")
+    own = tmp_path / "own" / ("farm.gpkg" if algorithm == "batch" else "field.gpkg")
+    shutil.copy(tmp_path / "own" / "field.gpkg", tmp_path / "parcels.gpkg")
+    if algorithm == "batch":
+        shutil.copy(tmp_path / "own" / "field.gpkg", own)
+    here = {"IMAGERY": str(SAMPLE), "POINT": "33.531142,35.075373 [EPSG:4326]"}
+    values = {
+        "plan": {**here, "OUTPUT": str(own.parent), "OVERWRITE": True},
+        "outline": {**here, "OUTPUT": str(own), "OVERWRITE": True},
+        "obstacles": {"IMAGERY": str(SAMPLE), "PLAN": f"{own}|layername=field", "OUTPUT": str(own)},
+        "import": {"FILES": [str(tmp_path / "parcels.gpkg")], "OUTPUT": str(own)},
+        "batch": {"PLACES": str(tmp_path / "parcels.gpkg"), "OUTPUT": str(own.parent)},
+    }
+    tracks = {"INPUT": f"{own}|layername=field", "SPACING_M": 8, "OUTPUT": str(own.parent)}
+    answer = qgis(
+        "run",
+        algorithm=f"geofield:{algorithm}",
+        values=values.get(algorithm, tracks),
+        beside={"vector": f"{own}|layername=obstacles", "edit": edits},
+    )
+    assert ("not saved" if edits else "is being edited") in answer["error"]
+
+
 def test_a_plan_that_is_shown_already_is_read_again(qgis, plan, tmp_path):
     """Layers stayed as they were before the run, or came once more."""
     own = shutil.copytree(plan, tmp_path / "own") / "field.gpkg"

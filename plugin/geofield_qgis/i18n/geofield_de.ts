@@ -50,6 +50,11 @@
     </message>
     <message>
       <location filename="algorithm.py" />
+      <source>The layer {0} is being edited: end that first, its file is replaced.</source>
+      <translation>Die Ebene {0} wird bearbeitet: beenden Sie das zuerst, ihre Datei wird ersetzt.</translation>
+    </message>
+    <message>
+      <location filename="algorithm.py" />
       <source>Plan</source>
       <translation>Plan</translation>
     </message>
