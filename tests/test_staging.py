@@ -288,10 +288,18 @@ def test_a_geopackage_that_another_program_edits_is_left_alone(plan: Path) -> No
         assert holder.stdout is not None
         holder.stdout.readline()
         done = run_geofield("tracks", plan, "--spacing", 4, "-o", plan)
+        # It is told before the work: the picture that it needs is not asked for.
+        nowhere, at = plan.with_name("no.tif"), ["--lat", 35.075373, "--lon", 33.531142]
+        early = [
+            run_geofield("run", nowhere, *at, "--out", plan.parent, "--overwrite"),
+            run_geofield("field", nowhere, *at, "-o", plan, "--overwrite"),
+            run_geofield("obstacles", nowhere, plan, "-o", plan),
+        ]
     finally:
         kill(holder)
-    assert done.returncode == 1
-    assert "open in another program" in done.stderr
+    for each in (done, *early):
+        assert each.returncode == 1
+        assert "open in another program" in each.stderr
     assert plan.read_bytes() == before
 
 

@@ -59,15 +59,19 @@ def output_option(help_text: str, kind: click.Path = FILE) -> Callable[[Command]
     return click.option("-o", "--output", required=True, type=kind, help=help_text)
 
 
-def claim_folder(folder: Path, names: Collection[str] | None = None) -> None:
+def claim_folder(
+    folder: Path, names: Collection[str] | None = None, *, replaced: Collection[str] = ()
+) -> None:
     """Claim a folder, or some names in it, until the command ends, before it reads what is there.
 
     Raises
     ------
     OutputExistsError
         Another geofield works there.
+    FormatError
+        A file that will be `replaced` cannot be: it is read-only, or open in another program.
     """
-    click.get_current_context().with_resource(claimed(folder, names))
+    click.get_current_context().with_resource(claimed(folder, names, replaced=replaced))
     tell_unsaved(folder, names)
 
 
@@ -89,7 +93,7 @@ def tell_unsaved(folder: Path, names: Collection[str] | None = None) -> None:
 
 def claim_file(output: Path) -> None:
     """The same for one file."""
-    claim_folder(output.parent, (output.name,))
+    claim_folder(output.parent, (output.name,), replaced=(output.name,))
 
 
 def claim_plan(output: Path) -> None:

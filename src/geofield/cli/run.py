@@ -101,7 +101,7 @@ def run(
     # What cannot be is said at once, not after the work.
     for each in settings.export.formats:
         format_named(each).refuse_undrawn()
-    claim_folder(out)
+    claim_folder(out, replaced=["field.gpkg"] if overwrite else ())
     # What file managers leave in a folder is hidden, as our own is.
     if not overwrite and any(not each.name.startswith(".") for each in out.iterdir()):
         raise OutputExistsError(

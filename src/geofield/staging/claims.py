@@ -19,7 +19,13 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 
 from geofield.errors import OutputExistsError
-from geofield.staging.folders import cannot_write, log_of, made_folder, written_ns
+from geofield.staging.folders import (
+    cannot_write,
+    log_of,
+    made_folder,
+    refuse_locked,
+    written_ns,
+)
 from geofield.staging.leftovers import PREFIX, alone, is_living, sweep, working_folder
 
 _CLAIM = "claim"
@@ -35,17 +41,22 @@ _MINE: dict[str, tuple[Path, Seen]] = {}
 
 
 @contextmanager
-def claimed(folder: Path | str, names: Collection[str] | None = None) -> Iterator[None]:
+def claimed(
+    folder: Path | str, names: Collection[str] | None = None, *, replaced: Collection[str] = ()
+) -> Iterator[None]:
     """Be the only geofield that works on a folder's products until the block ends.
 
     What the block then writes there by `staging` replaces nothing that was changed since it began.
     `names` are the files and folders in it that are claimed; all of it without. A missing folder is
-    made, and removed again when nothing comes into it.
+    made, and removed again when nothing comes into it. Of files that will be `replaced` it is told
+    at once that they cannot be.
 
     Raises
     ------
     OutputExistsError
         Another process holds them.
+    FormatError
+        A file that will be replaced is read-only, or open in another program.
     """
     target = Path(folder)
     with ExitStack() as held:
@@ -53,6 +64,8 @@ def claimed(folder: Path | str, names: Collection[str] | None = None) -> Iterato
         with alone(target) as certain:
             sweep(target, certain=certain)
             refuse_claimed(target, names)
+            for place in filter(Path.is_file, (target / name for name in replaced)):
+                refuse_locked(place)
             try:
                 _fold_in_logs(target)
                 sign = held.enter_context(working_folder(target))

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import errno
 import os
+import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 from geofield.errors import FormatError
+
+_SQLITE_MAGIC = b"SQLite format 3\x00"
 
 
 @contextmanager
@@ -82,3 +85,31 @@ def cannot_write(target: Path, error: OSError) -> FormatError:
     return FormatError(
         f"{target}: {error.strerror or error}.", hint="Repeat, or write to another folder."
     )
+
+
+def refuse_locked(place: Path) -> None:
+    """Refuse to replace a read-only file, or a GeoPackage that another program has open.
+
+    QGIS keeps a GeoPackage in WAL mode while it is open. Leaving that mode needs to be
+    alone with the file, and it also folds a write-ahead log left by a crash into the file:
+    otherwise SQLite would replay that log into the new one.
+    """
+    if not os.access(place, os.W_OK):
+        raise FormatError(
+            f"{place} is read-only.", hint="Make it writable, or write to another folder."
+        )
+    with place.open("rb") as file:
+        if file.read(16) != _SQLITE_MAGIC:
+            return
+    try:
+        with closing(sqlite3.connect(place, timeout=0.5, isolation_level=None)) as connection:
+            connection.execute("PRAGMA journal_mode = DELETE").fetchone()
+            connection.execute("BEGIN EXCLUSIVE")
+            connection.execute("ROLLBACK")
+    except sqlite3.OperationalError as error:
+        raise FormatError(
+            f"{place} is open in another program ({error}).",
+            hint="Close it there (in QGIS: remove its layers or close the project), then repeat.",
+        ) from error
+    except sqlite3.DatabaseError:
+        return  # damaged: nothing in it to protect from being replaced

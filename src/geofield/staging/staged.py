@@ -14,17 +14,15 @@ import shutil
 import sqlite3
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, closing, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from geofield.errors import FormatError, FormatWarning, OutputExistsError
 from geofield.notes import warn
 from geofield.staging.claims import Seen, before_work, refuse_changed, refuse_claimed, seen
-from geofield.staging.folders import cannot_write, made_folder
+from geofield.staging.folders import cannot_write, made_folder, refuse_locked
 from geofield.staging.leftovers import MOVING, alone, sweep, unstopped, working_folder
 from geofield.strangers import picture_file
-
-_SQLITE_MAGIC = b"SQLite format 3\x00"
 
 
 @contextmanager
@@ -185,31 +183,3 @@ def _keep(place: Path, kept: Path) -> None:
         os.link(place, kept)
     except OSError:
         shutil.copy2(place, kept)
-
-
-def refuse_locked(place: Path) -> None:
-    """Refuse to replace a read-only file, or a GeoPackage that another program has open.
-
-    QGIS keeps a GeoPackage in WAL mode while it is open. Leaving that mode needs to be
-    alone with the file, and it also folds a write-ahead log left by a crash into the file:
-    otherwise SQLite would replay that log into the new one.
-    """
-    if not os.access(place, os.W_OK):
-        raise FormatError(
-            f"{place} is read-only.", hint="Make it writable, or write to another folder."
-        )
-    with place.open("rb") as file:
-        if file.read(16) != _SQLITE_MAGIC:
-            return
-    try:
-        with closing(sqlite3.connect(place, timeout=0.5, isolation_level=None)) as connection:
-            connection.execute("PRAGMA journal_mode = DELETE").fetchone()
-            connection.execute("BEGIN EXCLUSIVE")
-            connection.execute("ROLLBACK")
-    except sqlite3.OperationalError as error:
-        raise FormatError(
-            f"{place} is open in another program ({error}).",
-            hint="Close it there (in QGIS: remove its layers or close the project), then repeat.",
-        ) from error
-    except sqlite3.DatabaseError:
-        return  # damaged: nothing in it to protect from being replaced
