@@ -7,6 +7,7 @@ import html
 import json
 import os
 import shutil
+import sqlite3
 import subprocess
 from pathlib import Path
 
@@ -166,6 +167,14 @@ def test_every_obstacle_is_found_by_its_number(product, qgis, tmp_path):
     write_dataset(dataclasses.replace(dataset, tables=tables), tmp_path, ["gpkg"])
     shown = qgis("render", uri=str(tmp_path / "field.qgz"), png=str(tmp_path / "shown.png"))
     assert sorted(shown["labels"]["geofield_obstacles"]) == sorted(numbers)
+
+
+def test_only_the_route_says_which_way_is_driven(product):
+    """Arrows on the tracks pointed the way lines are stored, against the route on every other."""
+    with sqlite3.connect(product / "field.gpkg") as file:
+        styles = dict(file.execute("SELECT f_table_name, styleQML FROM layer_styles"))
+    assert "line" in styles["tracks"]
+    assert "arrow" not in styles["tracks"]
 
 
 def at(picture, x_m, y_m, extent):

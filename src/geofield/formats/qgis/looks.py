@@ -193,17 +193,8 @@ LOOKS: dict[str, Look] = {
     ),
     "tracks": Look(
         (
-            Rule("Track", "line", (line(_BLACK, 0.4), line(_DRIVE, 0.22)), min_scale=1000),
-            Rule(
-                "Track with direction",
-                "line",
-                (
-                    line("0,40,60,160", 0.6),
-                    line(_DRIVE, 0.35),
-                    arrows(_DRIVE, every_m=20, size_m=1.8),
-                ),
-                max_scale=1000,
-            ),
+            # Without arrows: which way a line is driven is the route's to say.
+            Rule("Track", "line", (line("0,40,60,160", 0.6), line(_DRIVE, 0.35))),
         ),
         tuple(
             Label(
