@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import shutil
 import signal
 import sqlite3
@@ -481,6 +482,15 @@ def test_counts_are_right_for_one(driver: webdriver.Chrome, plan_path: Path) -> 
         page.run("window.onbeforeunload = null")
 
 
+def test_numbers_of_obstacles_lie_over_no_others(page: Page) -> None:
+    """11 beside 109 was read as 1109."""
+    sparse = page.driver.execute_async_script(
+        "const [done] = arguments; import('/map.js').then(({map, sources}) => done(map.getLayers()"
+        ".getArray().find(one => one.getSource() === sources.obstacles).getDeclutter()));"
+    )
+    assert sparse
+
+
 def test_what_was_dragged_off_the_picture_goes_back(page: Page) -> None:
     before = page.obstacle(8)
     page.run("document.querySelector('#list [data-no=\"8\"]').click()")
@@ -767,6 +777,9 @@ def test_notes_of_tracks_are_in_german(page: Page) -> None:
     )
     assert [text for text in told if text in notes] == []
     assert "Wege zwischen Abschnitten" in " ".join(told)
+    assert re.findall(r"\d+\.\d+", " ".join(told)) == []  # as the page's own numbers are
+    file = page.run("return import('/web/words.js').then(w => w.told('field.2.gpkg is there.'))")
+    assert "field.2.gpkg" in file
 
 
 def test_a_track_that_a_person_bent_is_shown_as_it_is(

@@ -13,8 +13,8 @@ const view = new ol.View({projection, minResolution: 0.01, maxResolution: 400, e
 const layers = [];
 if (plan.picture) layers.push(new ol.layer.Image({source: new ol.source.ImageStatic({
   url: plan.picture, imageExtent: plan.bounds, projection, interpolate: true})}));
-const add = (features, style, name) => {
-  const layer = new ol.layer.Vector({source: new ol.source.Vector({features}), style});
+const add = (features, style, name, declutter = false) => {
+  const layer = new ol.layer.Vector({source: new ol.source.Vector({features}), style, declutter});
   layer.set("name", name);
   layers.push(layer);
   return layer;
@@ -28,7 +28,7 @@ const shown = {
   drive: add(driveFeatures(plan.drive), driveStyle, "drive"),
   outline: add([new ol.Feature(closed(field.rings))], cased(outlineColor(field), 3), "outline"),
   frame: add(field.frame.map(xy => line(xy)), frameStyle(), "frame"),
-  obstacles: add(plan.obstacles.map(obstacleFeature), obstacleStyle, "obstacle"),
+  obstacles: add(plan.obstacles.map(obstacleFeature), obstacleStyle, "obstacle", true),
 };
 const popup = new ol.Overlay({element: document.getElementById("popup"), positioning: "bottom-center", offset: [0, -12],
                               stopEvent: true, autoPan: {margin: 20}});

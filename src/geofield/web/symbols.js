@@ -18,7 +18,7 @@ export function fade(color, alpha) {
   return `rgba(${value >> 16},${(value >> 8) & 255},${value & 255},${alpha})`;
 }
 
-const lettering = (text, font, color, placement, offsetX = 0) => new ol.style.Style({text: new ol.style.Text({
+const lettering = (text, font, color, placement, offsetX = 0, zIndex = 0) => new ol.style.Style({zIndex, text: new ol.style.Text({
   text, font, placement, offsetX, overflow: true, fill: new ol.style.Fill({color}), stroke: stroke("#000", 3)})});
 
 export const frameStyle = () => [new ol.style.Style({stroke: stroke("#fff", 4)}),
@@ -56,7 +56,7 @@ export function obstacleStyle(feature, resolution, chosen) {
                         fill: new ol.style.Fill({color: fade(look.color, faint ? 0.05 : 0.22)})}),
     new ol.style.Style({stroke: stroke(look.color, 2.2, look.dash)}),
   ];
-  if (resolution < 0.6 || chosen) styles.push(lettering(String(feature.getId()), "600 13px system-ui, sans-serif", "#fff"));
+  if (resolution < 0.6 || chosen) styles.push(lettering(String(feature.getId()), "600 13px system-ui, sans-serif", "#fff", "point", 0, chosen ? 2 : 1));
   return styles;
 }
 

@@ -94,10 +94,13 @@ export function told(text) {
   for (let n = sentences.length; n > 0; n--) {
     const first = sentences.slice(0, n).join(" "), rest = sentences.slice(n).join(" ");
     const found = SAID[language]?.find(([pattern]) => pattern.test(first));
-    if (found) return [first.replace(...found), ...(rest ? [told(rest)] : [])].join(" ");
+    if (found) return [local(first.replace(...found)), ...(rest ? [told(rest)] : [])].join(" ");
   }
   return sentences.length < 2 ? text : `${sentences[0]} ${told(sentences.slice(1).join(" "))}`;
 }
+
+// Numbers with a point, as the program writes them; not those of a file's name.
+const local = text => language === "de" ? text.replace(/(?<![\w./-])(\d+)\.(\d+)(?= (?:m|m²|ha|km|%)(?!\w)|\)|[,;.]? |$)/g, "$1,$2") : text;
 
 export const currentLanguage = () => language;
 

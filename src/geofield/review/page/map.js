@@ -21,7 +21,7 @@ export function build(state, chosen) {
   const layers = [];
   if (pictureFacts) layers.push(picture = new ol.layer.Tile({className: "picture", extent: state.bounds, preload: 1,
     source: tiles(state, "colour", projection)}));
-  const add = (name, style) => layers.push(new ol.layer.Vector({source: sources[name], style,
+  const add = (name, style, more = {}) => layers.push(new ol.layer.Vector({source: sources[name], style, ...more,
     updateWhileInteracting: true, updateWhileAnimating: true}));
   add("tracks", symbols.trackStyle);
   add("headland", symbols.cased(state.theme.headland, 1.6));
@@ -31,7 +31,7 @@ export function build(state, chosen) {
   add("drive", symbols.driveStyle);
   add("outline", feature => symbols.cased(feature.get("color"), 3));
   add("frame", symbols.frameStyle());
-  add("obstacles", (feature, resolution) => symbols.obstacleStyle(feature, resolution, feature.getId() === chosen()));
+  add("obstacles", (feature, resolution) => symbols.obstacleStyle(feature, resolution, feature.getId() === chosen()), {declutter: true});
   add("handle", new ol.style.Style({image: new ol.style.RegularShape({points: 4, radius: 9, angle: Math.PI / 4,
     fill: new ol.style.Fill({color: "#fff"}), stroke: symbols.stroke("#000", 2)})}));
   add("sketch", symbols.cased(state.theme.outline, 2, [6, 6]));
