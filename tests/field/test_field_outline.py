@@ -65,6 +65,37 @@ def test_holes_are_kept():
     assert shapely.Polygon(outline.interiors[0]).area == pytest.approx(400, rel=0.03)
 
 
+def with_a_round_hole(mask, x, y, radius):
+    row, column = np.indices(mask.shape) + 0.5
+    return mask & (np.hypot(column - x, row - y) >= radius)
+
+
+def test_a_crown_in_a_field_stays_round():
+    mask = with_a_round_hole(pixels(turned(RECTANGLE, 0.4)), 128, 128, 10)
+    hole = shapely.Polygon(straight_outline(mask).interiors[0])
+    crown = shapely.Point(128, 128).buffer(10)
+    assert hole.intersection(crown).area / hole.union(crown).area > 0.95
+
+
+def test_the_corner_where_a_machine_turns_is_where_the_sides_meet():
+    truth = turned(RECTANGLE, 0.1)
+    outline = straight_outline(pixels(truth.buffer(-4).buffer(4)))
+    assert len(outline.exterior.coords) - 1 == 4
+    assert truth.exterior.hausdorff_distance(outline.exterior) < 0.2
+
+
+def test_a_side_on_the_picture_s_edge_is_exactly_there_beside_a_crown():
+    mask = pixels(turned(RECTANGLE, 0.2, (128, 220)))
+    rows = shapely.get_coordinates(straight_outline(with_a_round_hole(mask, 90, 256, 10)))[:, 1]
+    assert rows[rows > 252].tolist() == [256.0] * 4
+
+
+def test_a_field_of_four_pixels_is_their_square():
+    mask = np.zeros((9, 9), bool)
+    mask[3:5, 3:5] = True
+    assert straight_outline(mask).equals(shapely.box(3, 3, 5, 5))
+
+
 def test_zero_tolerance_keeps_the_staircase():
     mask = pixels(turned(RECTANGLE, 0.4))
     assert straight_outline(mask, tolerance_px=0).area == mask.sum()

@@ -61,8 +61,7 @@ def mask_polygon(mask: BoolArray) -> Polygon:
         )
     )
     shell, *holes = (shapely.linearrings(one) for one in geometry["coordinates"])
-    polygon = Polygon(shell, holes)
-    return largest_valid(polygon)  # rings may touch at a corner
+    return Polygon(shell, holes)
 
 
 def largest_valid(polygon: Polygon) -> Polygon:
@@ -98,8 +97,7 @@ def straight_outline(mask: BoolArray, *, tolerance_px: float = 3.0) -> Polygon:
         if polygon is not None and mean_deviation_px(polygon, exact) <= 1.0:
             return polygon
         tolerance /= 1.5
-    simple = exact.simplify(0.5, preserve_topology=True)
-    return cast(Polygon, simple) if simple.is_valid else exact
+    return cast(Polygon, exact.simplify(0.5, preserve_topology=True))
 
 
 def mean_deviation_px(outline: Polygon, exact: Polygon) -> float:
@@ -113,8 +111,6 @@ def mean_deviation_px(outline: Polygon, exact: Polygon) -> float:
 def _straighten(exact: Polygon, tolerance: float, width: int, height: int) -> Polygon | None:
     """The polygon with every ring straightened; None when that is not a valid polygon."""
     shell = _straight_ring(shapely.get_coordinates(exact.exterior), tolerance, width, height)
-    if shell is None:
-        return None
     polygon = Polygon(shell)
     if not polygon.is_valid or polygon.area < 0.5 * exact.area:
         return None
@@ -122,15 +118,12 @@ def _straighten(exact: Polygon, tolerance: float, width: int, height: int) -> Po
     for ring in exact.interiors:
         # Crowns are round: a tolerance that suits a border would make them lozenges.
         small = min(tolerance, _HOLE_SHARE * Polygon(ring).area ** 0.5)
-        hole = _straight_ring(shapely.get_coordinates(ring), small, width, height)
-        if hole is None:
-            hole = shapely.get_coordinates(ring)
-        holes.append(hole)
+        holes.append(_straight_ring(shapely.get_coordinates(ring), small, width, height))
     if holes:
         with_holes = Polygon(shell, holes)
         # A straightened hole may cross the border or another hole: cut instead.
         polygon = with_holes if with_holes.is_valid else _cut(polygon, holes)
-    return polygon if polygon.is_valid and not polygon.is_empty else None
+    return polygon
 
 
 def _cut(polygon: Polygon, holes: list[FloatArray]) -> Polygon:
@@ -139,10 +132,8 @@ def _cut(polygon: Polygon, holes: list[FloatArray]) -> Polygon:
     return Polygon(max(parts, key=lambda part: part.area))
 
 
-def _straight_ring(
-    corners: FloatArray, tolerance: float, width: int, height: int
-) -> FloatArray | None:
-    """Vertices of a straightened ring, or None when fewer than three are left."""
+def _straight_ring(corners: FloatArray, tolerance: float, width: int, height: int) -> FloatArray:
+    """Vertices of a straightened ring, three at least: GEOS leaves so many of a closed line."""
     chain = _midpoints(corners)
     if len(chain) < 12:
         return corners[:-1]
@@ -151,10 +142,7 @@ def _straight_ring(
     chain = np.roll(chain, -farthest, axis=0)
     closed = np.vstack([chain, chain[:1]])
     simple = shapely.get_coordinates(shapely.LineString(closed).simplify(tolerance))
-    breaks = _indices(closed, simple)
-    if len(breaks) < 4:
-        return None
-    pieces = list(pairwise(breaks))
+    pieces = list(pairwise(_indices(closed, simple)))
     long = [(a, b) for a, b in pieces if b - a >= _SHORT * tolerance]
     if len(long) >= 3:
         pieces = long  # what is left out is the rounding of a corner
@@ -168,8 +156,7 @@ def _straight_ring(
     ring = np.clip(np.array(vertices), 0, [width, height])
     # Lines that became one leave vertices that say nothing.
     flat = shapely.LineString(np.vstack([ring, ring[:1]])).simplify(0.3 * tolerance)
-    turns = shapely.get_coordinates(flat)[:-1]
-    return turns if len(turns) >= 3 else None
+    return shapely.get_coordinates(flat)[:-1]
 
 
 def _midpoints(corners: FloatArray) -> FloatArray:
