@@ -189,12 +189,24 @@ def test_a_part_knows_where_it_lies_in_the_picture():
     here = shapely.box(0, 0, 250, 200)
     assert part.to_picture(here).bounds == (30.0, 0.0, 80.0, 40.0)
     assert part.to_picture(part.frame_px).bounds == (0.0, 0.0, 100.0, 200.0)
+    with_data = part.from_picture(shapely.box(10, 20, 90, 110))
+    assert with_data is not None
+    assert with_data.bounds == (-100.0, 100.0, 300.0, 550.0)
     # Along the picture's own frame an outline is not cut, along the other sides it is.
     assert not part.cuts(shapely.box(20, 0, 200, 150), 2.0)
     assert part.cuts(shapely.box(1, 20, 200, 150), 2.0)
     assert part.cuts(shapely.box(20, 20, 249, 150), 2.0)
     assert part.cuts(shapely.box(20, 20, 200, 199), 2.0)
     assert not part.cuts(shapely.box(20, 20, 200, 150), 2.0)
+    # A corner that touches a side is none that goes on: it may take two hundredths of the border.
+    spit = [(20, 20), (200, 20), (200, 70), (249, 70), (249, 80), (200, 80), (200, 150), (20, 150)]
+    assert not part.cuts(shapely.Polygon(spit), 2.0)
+    wider = [(x, 85 if y == 80 else 65 if y == 70 else y) for x, y in spit]
+    assert part.cuts(shapely.Polygon(wider), 2.0)
+    below = Part((0, 160, 100, 40), (100, 200))
+    assert below.sides_inside == (False, True, False, False)
+    assert not below.cuts(shapely.box(0, 20, 100, 40), 2.0)
+    assert below.cuts(shapely.box(20, 0, 80, 20), 2.0)
 
 
 def test_no_alternative_ends_where_the_search_did(wide):

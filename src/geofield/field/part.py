@@ -7,6 +7,7 @@ on the ground. In a picture of 128 pixels of 1.2 m, or 51 of 3 m, they are too w
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 import shapely
@@ -76,19 +77,13 @@ class Part:
         return shapely.transform(polygon, lambda xy: xy / self.times + self.box[:2])
 
     def from_picture(self, shown_px: Shown | None) -> Shown | None:
-        """Where the whole picture has data, pixel coordinates of the part."""
-        if shown_px is None:
-            return None
+        """Where the whole picture has data, if that is known, pixel coordinates of the part."""
         return shapely.transform(shown_px, lambda xy: self.times * (xy - self.box[:2]))
 
     @property
     def frame_px(self) -> Polygon:
         """The whole picture's frame, pixel coordinates of the part."""
-        left, top = self.box[:2]
-        width, height = self.picture_px
-        corners = np.array([-left, -top, width - left, height - top])
-        frame: Polygon = shapely.box(*(self.times * corners))
-        return frame
+        return cast(Polygon, self.from_picture(shapely.box(0, 0, *self.picture_px)))
 
     @property
     def sides_inside(self) -> tuple[bool, bool, bool, bool]:
