@@ -11,7 +11,8 @@ import shapely
 
 from geofield.field import extract_field
 from geofield.field.answer import doubtful
-from geofield.field.likely import Candidate, Likely, other_outlines
+from geofield.field.likely import Candidate, Likely, likeliest, other_outlines
+from geofield.field.ranking import trained
 from geofield.field.search import WindowSearch, search_field
 from geofield.simulate import SimulationSettings, simulate_field
 
@@ -61,6 +62,40 @@ def test_what_is_offered_covers_what_may_be_meant_and_not_twice_the_same():
     assert sure == sorted(sure, reverse=True)
     # Both are dealt from what the taken one leaves; the scrap keeps the rest of it.
     assert 0.39 < sum(sure) < 0.4
+
+
+def test_one_other_ground_is_offered_once():
+    own = candidate(shapely.box(0, 0, 100, 100), 2.0)
+    half = candidate(shapely.box(0, 0, 50, 100), 1.0)
+    assert [one.candidate for one in other_outlines(taken(own), [own, half])] == [half]
+
+
+def test_nothing_offered_is_surer_than_what_is_taken():
+    own = candidate(shapely.box(0, 0, 100, 100), 2.0)
+    half = candidate(shapely.box(0, 0, 50, 100), 1.0)
+    (other,) = other_outlines(taken(own, certainty=0.2), [own, half])
+    assert (other.certainty, other.ground) == pytest.approx((0.2, 0.3))
+
+
+def test_what_is_nearly_offered_gives_way_to_other_ground():
+    own = candidate(shapely.box(0, 0, 100, 100), 2.0)
+    half, nearly = (candidate(shapely.box(0, 0, x, 100), 1.5) for x in (50, 59))
+    wide = candidate(shapely.box(0, 0, 160, 100), 1.0)
+    first, second = other_outlines(taken(own), [own, nearly, half, wide])
+    assert first.candidate in (half, nearly)
+    assert second.candidate is wide
+
+
+def test_no_outline_is_told_as_quite_certain():
+    """Whatever its figures say: a picture cannot show whose field it is."""
+    ranking = trained()
+    figures = {**dict.fromkeys(ranking.names, 0.0), "network_overlap": 9.0, "corrections": 0.0}
+    sure = {what: {"constant": 50.0} for what in ("field", "ground", "border")}
+    all_sure = replace(ranking, calibration={"first": sure})
+    own = replace(candidate(shapely.box(0, 0, 100, 100), 2.0), figures=figures)
+    told = likeliest([own], all_sure)
+    assert told.candidate is own
+    assert (told.certainty, told.ground, told.border) == (0.99, 0.99, 0.99)
 
 
 def test_the_same_ground_is_no_alternative():
