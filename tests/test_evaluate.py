@@ -32,10 +32,13 @@ def test_a_truth_is_matched_once():
     assert match.false_index.tolist() == [1]
 
 
-def test_as_many_hits_as_possible_come_before_short_distances():
+@pytest.mark.parametrize("scale", [0.01, 1.0, 40.0])
+def test_as_many_hits_as_possible_come_before_short_distances(scale):
     # The nearest pair (1, 0) would leave the other two apart.
-    match = match_points([[0.0, 0], [3.0, 0]], [[2.0, 0], [6.0, 0]], 3.5)
-    assert len(match.truth_index) == 2
+    found, true = scale * np.array([[0.0, 0], [3.0, 0]]), scale * np.array([[2.0, 0], [6.0, 0]])
+    match = match_points(found, true, 3.5 * scale)
+    assert match.detected_index.tolist() == match.truth_index.tolist() == [0, 1]
+    assert match.distance == pytest.approx([2 * scale, 3 * scale])
 
 
 @given(
@@ -63,8 +66,10 @@ def test_figures_of_a_hand_made_case():
     assert score.radius_error == pytest.approx(0.5)
     # On the ground: 500 km off the zone's middle it draws a metre 0.27 % longer.
     assert score.distance == pytest.approx(1.5 / 1.0027, rel=1e-4)
-    low, high = score.interval["f1"]
-    assert low < score.f1 < high
+    for name in ("precision", "recall", "f1"):
+        low, high = score.interval[name]
+        assert 0.0 <= low < getattr(score, name) < high <= 1.0
+    assert score.interval["radius_bias"] == pytest.approx((-0.5, 0.5))
 
 
 def test_truth_may_be_points_or_boxes_in_degrees():
@@ -101,7 +106,21 @@ def test_several_pictures_are_pooled():
     assert result.pooled.as_dict()["detected"] == 12
 
 
+def test_doubt_is_that_of_pictures_where_there_are_five():
+    """One picture of many misses: whether it is among those drawn is all that counts."""
+    there = [(30.0 * k, 0.0) for k in range(40)]
+    truth = {str(k): table(there if k == 0 else there[:1]) for k in range(5)}
+    found = {name: each[:1] for name, each in truth.items()}
+    low, high = gf.evaluate(found, truth).pooled.interval["recall"]
+    assert low < 0.06
+    assert high == 1.0
+    four = [{name: each[name] for name in "0123"} for each in (found, truth)]
+    low, high = gf.evaluate(*four).pooled.interval["recall"]
+    assert 0.0 < low < 4 / 43 < high < 0.3
+
+
 def test_nothing_against_nothing():
+    assert gf.evaluate({}, {}).pooled.truth == 0
     score = gf.evaluate(table([]), table([])).pooled
     assert score.detected == score.truth == 0
     assert score.as_dict()["f1"] is None
@@ -126,6 +145,13 @@ def test_reliability_of_honest_and_boastful_confidences():
     hit = rng.random(p.size) < p
     assert reliability(p, hit)[3] < 0.02
     assert reliability(np.sqrt(p), hit)[3] > 0.1
+    mean, share, count, error = reliability([0.0, 1.0, 0.95], [False, True, True], bins=4)
+    assert count.tolist() == [1, 0, 0, 2]
+    assert mean[[0, 3]] == pytest.approx([0.0, 0.975])
+    assert share[[0, 3]].tolist() == [0.0, 1.0]
+    assert np.isnan(mean[1])
+    assert error == pytest.approx(0.05 / 3)
+    assert np.isnan(reliability([], [])[3])
 
 
 def test_false_ones_that_are_no_trees_are_told(tmp_path, capsys):

@@ -357,6 +357,8 @@ def test_the_cost_of_a_miss_moves_the_line(simulated):
         counts.append((len(active(found)), len(found)))
     assert counts == sorted(counts)
     assert thresholds(30) == pytest.approx((1 / 6, 1 / 21))
+    # Where a miss is cheap, nothing is shown that is not worth a detour.
+    assert thresholds(1) == pytest.approx((2 / 3.3, 2 / 3.3))
 
 
 @pytest.mark.parametrize(

@@ -69,7 +69,7 @@ def match_points(detected: ArrayLike, truth: ArrayLike, distance: float) -> Matc
     from scipy.spatial import cKDTree
 
     refuse_no_number(ObstacleError, "metres, above zero", distance_m=distance)
-    if not (np.isfinite(distance) and distance > 0):
+    if distance <= 0:
         raise ObstacleError(f"The matching distance {distance:g} is not above zero.")
     found = np.asarray(detected, dtype=float).reshape(-1, 2)
     true = np.asarray(truth, dtype=float).reshape(-1, 2)
@@ -87,10 +87,7 @@ def match_points(detected: ArrayLike, truth: ArrayLike, distance: float) -> Matc
         graph = coo_matrix((np.ones(len(rows)), (rows, cols + len(found))), shape=(size, size))
         _, group = connected_components(graph, directed=False)
         order = np.argsort(group[rows], kind="stable")
-        starts = np.flatnonzero(np.r_[True, np.diff(group[rows][order]) != 0])
-        for part in np.split(order, starts[1:]):
-            if not part.size:
-                continue
+        for part in np.split(order, 1 + np.flatnonzero(np.diff(group[rows][order]))):
             r, i = np.unique(rows[part], return_inverse=True)
             c, j = np.unique(cols[part], return_inverse=True)
             # A pair out of reach costs more than any number of pairs within it.
