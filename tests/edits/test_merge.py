@@ -49,12 +49,13 @@ def with_status(table: Frame, *status: str) -> Frame:
 @pytest.mark.parametrize("status", ["confirmed", "rejected"])
 def test_what_hardly_reaches_out_of_a_reviewed_obstacle_is_part_of_it(status: str) -> None:
     before = found((120, 50, 4), (50, 50, 8), (90, 50, 4))
-    again = (120, 50, 4), (90, 50, 4), (50.5, 50, 7), (56.5, 50, 2), (50, 57, 3)
+    again = (120, 50, 4), (90, 50, 4), (50.5, 50, 7), (56.5, 50, 2), (50, 57, 3), (170, 50, 3)
     edited = with_status(before, status, status, "detected")
     after, changes = searched_again(before, edited, *again)
-    # Of the last one more than three tenths lie outside, of the one before less.
-    assert (changes.new, changes.gone, changes.found_again) == ((4,), (), 1)
-    assert after["status"].to_dict() == {1: status, 2: status, 3: "detected", 4: "detected"}
+    # Of the one before the last more than three tenths lie outside, of the one before it less.
+    assert (changes.new, changes.gone, changes.found_again) == ((4, 5), (), 1)
+    assert sorted(after.index) == [1, 2, 3, 4, 5]
+    assert after["status"].loc[[1, 2, 3, 4, 5]].tolist() == [status, status, *["detected"] * 3]
     assert after.geometry[4].centroid.y == pytest.approx(5_600_057, abs=0.1)
 
 
@@ -79,6 +80,15 @@ def test_a_tree_far_larger_than_what_is_driven_through_is_another(said: str) -> 
     assert changes.new == ()
 
 
+def test_where_all_is_gone_an_empty_table_is_left() -> None:
+    before = found((50, 50, 4), (90, 50, 4))
+    after, changes = searched_again(before, before)
+    assert changes.gone == (1, 2)
+    assert len(after) == 0
+    assert list(after.columns) == list(before.columns)
+    assert after.crs == before.crs
+
+
 def test_what_stands_outside_the_field_is_not_sought() -> None:
     before = found((50, 50, 4), (-10, 50, 4))
     _, changes = searched_again(before, with_status(before, "confirmed", "confirmed"))
@@ -95,12 +105,13 @@ def test_what_nobody_reviewed_stays_unseen_in_the_field_alone() -> None:
 
 
 def test_only_what_is_driven_through_of_an_avoided_tree_is_told() -> None:
-    before = found((30, 50, 2), (60, 50, 2), (90, 50, 4), (120, 50, 2))
-    edited = with_status(before, "confirmed", "rejected", "confirmed", "confirmed")
+    before = found((30, 50, 2), (60, 50, 2), (90, 50, 4), (120, 50, 2), (160, 50, 2))
+    edited = with_status(before, "confirmed", "rejected", "confirmed", "confirmed", "rejected")
     beside = Frame(geometry=[translate(found((120, 50, 6)).geometry[0], 0.5)], crs=edited.crs)
     edited = pd.concat([edited, beside], ignore_index=True)
-    # The third is as large as it was, with a wider margin; the fourth grew into what was drawn.
-    again = (30, 50, 4), (60, 50, 4), (90, 50, 4), (120, 50, 4)
+    # The third is as large as it was, with a wider margin; the fourth grew into what was drawn;
+    # the last grew, and is driven through whatever its size.
+    again = (30, 50, 4), (60, 50, 4), (90, 50, 4), (120, 50, 4), (160, 50, 2.7)
     _, changes = searched_again(before, edited, *again, buffer_m=3.0)
     assert changes.outgrown == (1,)
     assert "1 of yours smaller than what is found there (1)" in changes.in_words()
