@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from geofield.field.frame import Frame
-from geofield.field.median import median
 from geofield.field.straight import ring
 from geofield.raster import bilinear
 
@@ -91,7 +90,7 @@ def _along(
     changes = _smoothed(np.stack([high - low, middle - 0.5 * (low + high)]))
     strength = np.sqrt(np.einsum("...c,...c->...", changes, changes)).max(axis=0)
     at, within = strength[: len(_AT_PX)], strength[len(_AT_PX) :]
-    base = math.log(max(float(median(within.ravel())), 0.4) + 0.3)
+    base = math.log(max(float(np.median(within)), 0.4) + 0.3)
     own, inside = (np.sort(np.log(each.max(axis=0) + 0.3)) for each in (at, within))
     count = len(places)
     return {

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from geofield.field.median import median
 from geofield.field.morphology import plump
 
 BoolArray = NDArray[np.bool_]
@@ -115,7 +114,7 @@ def _ring(own: BoolArray) -> BoolArray:
 
 def _like_most(ground: FloatArray) -> BoolArray:
     """Which places of some ground (channels, places) are like most of it."""
-    away = ground - median(ground)[:, None]
+    away = ground - np.median(ground, axis=1)[:, None]
     return np.asarray(np.sqrt(np.einsum("cn,cn->n", away, away)) < _EVEN)
 
 

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from geofield.errors import FieldError
-from geofield.field.median import median
 from geofield.field.straight import Line, meeting
 
 BoolArray = NDArray[np.bool_]
@@ -188,7 +187,7 @@ def _fit(points: FloatArray) -> Line:
     centre, direction = _least_squares(points)
     for _ in range(3 if len(points) >= _ROBUST_FROM else 0):
         offset = np.abs((points - centre) @ np.array([-direction[1], direction[0]]))
-        near = offset <= max(0.75, 1.5 * float(median(offset)))
+        near = offset <= max(0.75, 1.5 * float(np.median(offset)))
         centre, direction = _least_squares(points[near])
     return centre, direction
 
