@@ -7,6 +7,7 @@ what the others are.
 from __future__ import annotations
 
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -277,14 +278,32 @@ def read_foreign(
                 notes.append(f"{each.name}: {are} geofield's own layer {layer.name}")
         if len(frame):
             foreign.append(RawLayer(each.name, frame))
-    tables = {
+    tables: dict[str, Any] = {
         name: parts[0]
         if len(parts) == 1
         else schema.conform(schema.layer(name), pd.concat(parts), extras=True)
         for name, parts in own.items()
     }
+    made = partial(_sorted, foreign, tables, metric, path, name, notes)
+    try:
+        return made()
+    except SeveralFieldsError as error:
+        error.as_obstacles = partial(made, inside=True)
+        raise
 
-    guessed = _guessed(foreign, tables, metric, path, name)
+
+def _sorted(
+    layers: list[RawLayer],
+    tables: dict[str, Any],
+    metric: CRS,
+    path: Path,
+    name: str | None,
+    notes: list[str],
+    *,
+    inside: bool = False,
+) -> Dataset:
+    """The dataset in which what is not geofield's own has its place, too; as of `sort_out`."""
+    guessed = sort_out(layers, tables, metric, path, inside=inside)
     # A file of geofield alone leaves nothing to guess.
     notes = notes + guessed if guessed else []
     if not any(len(table) for table in tables.values()):
@@ -296,22 +315,6 @@ def read_foreign(
     if name is None and named and isinstance(named[0], str):
         name = named[0]
     return Dataset(tables, metric, name or path.stem, notes=tuple(notes))
-
-
-def _guessed(
-    layers: list[RawLayer], tables: dict[str, Any], metric: CRS, path: Path, name: str | None
-) -> list[str]:
-    """What `sort_out` tells; where it finds several outlines they may be obstacles."""
-
-    def as_obstacles() -> Dataset:
-        notes = sort_out(layers, tables, metric, path, inside=True)
-        return Dataset(tables, metric, name or path.stem, notes=tuple(notes))
-
-    try:
-        return sort_out(layers, tables, metric, path)
-    except SeveralFieldsError as error:
-        error.as_obstacles = as_obstacles
-        raise
 
 
 def _read(frame: gpd.GeoDataFrame, where: str, crs: CRS | None) -> gpd.GeoDataFrame:
