@@ -89,13 +89,16 @@ class _RootSeenError(Exception):
 def check_vector(path: Path | str) -> None:
     """Refuse a vector file that is empty, a half or only points elsewhere, and a picture.
 
-    XML that defines entities is refused, too.
+    XML that defines entities is refused, too, and schemas that GML names are not fetched.
 
     Raises
     ------
     FormatError
         Naming file and reason.
     """
+    import pyogrio
+
+    pyogrio.set_gdal_config_options({"GML_DOWNLOAD_SCHEMA": "NO"})
     file = Path(path)
     if not file.is_file():
         return

@@ -293,7 +293,7 @@ def test_vectors_call_nobody_either(
         assert done.returncode in ((0, 1) if name == "a.gml" else (int(not none),)), done.stdout
         assert "Traceback" not in done.stderr
     assert not stranger.was_called
-    assert not (tmp_path / "new.gpkg").exists()
+    assert (tmp_path / "new.gpkg").exists() == (name == "a.gml")
 
 
 ENTITIES = (

@@ -149,12 +149,9 @@ def read_parquet(path: Path) -> gpd.GeoDataFrame:
 
 
 def _look_at(path: Path) -> None:
-    """Refuse files that lead elsewhere or hold no rows; schemas that GML names are not fetched."""
-    import pyogrio
-
-    refuse_no_rows(path)
+    """Refuse files that lead elsewhere or hold no rows."""
     check_vector(path)
-    pyogrio.set_gdal_config_options({"GML_DOWNLOAD_SCHEMA": "NO"})
+    refuse_no_rows(path)
 
 
 def _mended(path: Path, layer: str | None) -> Any:

@@ -99,7 +99,6 @@ def _by_content(place: Path) -> Format:
         return format_named("gpkg")
     if place.name in ("Field.txt", "Boundary.txt", "TrackLines.txt"):
         return format_named("agopengps")
-    check_vector(place)
     if _has_shapes(place):
         return OTHER
     if place.suffix.lower() in _SHEETS:
@@ -216,6 +215,7 @@ def _has_shapes(place: Path) -> bool:
     """Whether GDAL finds a layer with shapes in a file or folder, such as a file geodatabase."""
     import pyogrio
 
+    check_vector(place)
     try:
         return any(kind is not None for _, kind in pyogrio.list_layers(place))
     except pyogrio.errors.DataSourceError:
