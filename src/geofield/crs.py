@@ -86,7 +86,7 @@ def utm_crs(lon: float, lat: float) -> CRS:
     if 56.0 <= lat < 64.0 and 3.0 <= lon < 12.0:
         zone = 32
     elif lat >= 72.0 and 0.0 <= lon < 42.0:
-        zone = 31 + 2 * int((lon + 3.0) // 12.0) if lon >= 9.0 else 31
+        zone = 31 + 2 * int((lon + 3.0) // 12.0)
     return _named(f"EPSG:{(32600 if lat >= 0 else 32700) + zone}")
 
 

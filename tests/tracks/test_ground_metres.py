@@ -218,7 +218,13 @@ def test_a_national_grid_of_another_datum_counts_as_well():
 
 
 @pytest.mark.parametrize(
-    ("code", "place"), [(5070, (-120.0, 47.0)), (3035, (-8.0, 39.0)), (4087, (10.0, 60.0))]
+    ("code", "place"),
+    [
+        (5070, (-120.0, 47.0)),
+        (3035, (-8.0, 39.0)),
+        (3035, (13.0, 52.0)),  # by 0.03 %
+        (4087, (10.0, 60.0)),
+    ],
 )
 def test_a_grid_that_has_no_one_scale_is_refused(code, place):
     """In Portugal passes in that of Europe ran at 44.2 degrees for 45, 5.93 m apart for 6."""
