@@ -124,6 +124,56 @@ def test_a_move_that_a_kill_cut_is_finished(
     assert leftovers(tmp_path) == []
 
 
+#: Writes one of two files that are one product.
+LESS = WRITER.replace('("a.txt", "sub/b.txt")', '("a.txt",)').replace(
+    "overwrite=True", 'overwrite=True, products=[{target / "a.txt", target / "b.txt"}]'
+)
+
+
+def test_what_a_product_has_no_more_goes_with_the_move(tmp_path: Path) -> None:
+    for name in ("b.txt", "mine.txt"):
+        (tmp_path / name).write_text("old")
+    subprocess.run([sys.executable, "-c", LESS, tmp_path, "n", "0"], check=True)
+    assert {file.name for file in tmp_path.iterdir()} == {"a.txt", "mine.txt"}
+    (tmp_path / "b.txt").write_text("old")
+    with staged_folder(tmp_path, products=[{tmp_path / "a.txt", tmp_path / "b.txt"}]) as folder:
+        (folder / "c.txt").touch()
+    assert (tmp_path / "b.txt").read_text() == "old"
+
+
+@pytest.mark.parametrize("moment", ["replace", "unlink"])
+def test_what_goes_is_there_until_all_is_in_place(tmp_path: Path, moment: str) -> None:
+    (tmp_path / "b.txt").write_text("old")
+    fails = (
+        f"import errno\nreal = Path.{moment}\ndef full(self, *given, **how):\n"
+        f"    Path.{moment} = real\n    raise OSError(errno.EIO, 'broken')\n"
+        f"Path.{moment} = full\ntry:"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", LESS.replace("try:", fails, 1), tmp_path, "n", "0"],
+        check=False,
+        capture_output=True,
+        text=True,
+    )
+    assert "broken" in done.stderr
+    assert {file.name: file.read_text() for file in tmp_path.iterdir()} == {"b.txt": "old"}
+
+
+def test_what_goes_has_gone_when_a_kill_cut_the_move(tmp_path: Path) -> None:
+    (tmp_path / "b.txt").write_text("old")
+    kills = (
+        "import os, signal\nreplace = Path.replace\ndef once(self, place):\n"
+        "    replace(self, place)\n    os.kill(os.getpid(), signal.SIGKILL)\n"
+        "Path.replace = once\ntry:"
+    )
+    line = [sys.executable, "-c", LESS.replace("try:", kills, 1), str(tmp_path), "n", "0"]
+    assert subprocess.run(line, check=False).returncode == -signal.SIGKILL
+    assert {file.name for file in tmp_path.glob("*.txt")} == {"a.txt", "b.txt"}
+    with staged_folder(tmp_path):
+        pass
+    assert {file.name for file in tmp_path.iterdir()} == {"a.txt"}
+
+
 def test_of_many_writers_one_wins_and_the_others_say_so(tmp_path: Path) -> None:
     writers = [writer(tmp_path, mark, 0.5) for mark in "abcdef"]
     told = [each.communicate(timeout=120)[1] for each in writers]

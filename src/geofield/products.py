@@ -50,8 +50,9 @@ def write_products(
     and are never replaced.
     """
     asked = [name for name in formats if not format_named(name).automatic]
+    products = [format_named(name).places(folder) for name in asked]
     with (
-        staged_folder(folder, overwrite=overwrite, inputs=inputs) as staging,
+        staged_folder(folder, overwrite=overwrite, inputs=inputs, products=products) as staging,
         ThreadPoolExecutor(max_workers=1) as beside,
     ):
         written: list[Path] = []

@@ -60,7 +60,8 @@ def renew(plan_file: Path) -> list[Path]:
         name: {"points": True} for name in present if points and "points" in FORMATS[name].options
     }
     folder = plan_file.parent
-    with staged_folder(folder, overwrite=True, inputs=[plan_file]) as staging:
+    products = [FORMATS[name].places(folder) for name in present]
+    with staged_folder(folder, overwrite=True, inputs=[plan_file], products=products) as staging:
         names = [name for name in present if name != "report"]
         written = write_dataset(
             dataset, staging, names, stem=plan_file.stem, options=options, tell_drops=False

@@ -342,6 +342,38 @@ def test_an_exported_plan_that_a_person_edited_stays_as_the_earlier_one(plan_fil
     assert (gpd.read_file(copy, layer="obstacles")["note"] == "a well").all()
 
 
+def test_layers_that_a_product_has_no_more_go_with_the_earlier_one(plan_file, tmp_path):
+    """A file of rejected obstacles stayed beside the new ones, with what is driven around again."""
+    out = tmp_path / "out"
+    words = ("export", plan_file, "-f", "shapefile", "-f", "geojson", "--out", out)
+    assert geofield(*words).returncode == 0
+    earlier = {file.name for file in (out / "shapefile").iterdir()}
+    assert {f"obstacles_rejected.{end}" for end in ("shp", "shx", "dbf", "prj", "cpg")} <= earlier
+    own = [out / "geojson/mine.geojson", out / "shapefile/obstacles_rejected.qml"]
+    for file in (*own, out / "geojson/headland.geojson", out / "shapefile/obstacles_rejected.qix"):
+        file.write_text("{}")
+
+    edited = gpd.read_file(plan_file, layer="obstacles")
+    edited["status"] = edited["status"].replace("rejected", "confirmed")
+    edited.to_file(plan_file, layer="obstacles")
+    refused = geofield(*words)
+    assert refused.returncode == 1
+    assert {file.name for file in (out / "shapefile").iterdir()} > earlier
+
+    done = geofield(*words, "--overwrite")
+    assert done.returncode == 0, done.stderr
+    assert not list((out / "shapefile").glob("obstacles_rejected.[!q]*"))
+    assert not (out / "geojson/headland.geojson").exists()
+    assert [file for file in own if not file.exists()] == []
+    numbers = gpd.read_file(out / "shapefile/obstacles.shp")
+    assert len(numbers) == (edited["status"] != "possible").sum()
+
+    # Another profile is another product.
+    done = geofield(*words[:4], "--option", "profile=tracklead", "--out", out, "--overwrite")
+    assert done.returncode == 0, done.stderr
+    assert (out / "shapefile/boundary.shp").exists()
+
+
 @pytest.mark.parametrize("name", ["dxf", "shapefile", "gpx", "geojson", "flatgeobuf"])
 def test_a_file_that_found_no_room_is_told(tmp_path, name):
     """A DXF lost all its lines without a word; a Shapefile ended in a traceback."""

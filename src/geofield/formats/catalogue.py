@@ -110,7 +110,12 @@ CATALOGUE: tuple[Format, ...] = (
     Format(
         "shapefile",
         "ESRI Shapefile",
-        ("shapefile/boundary.shp", "shapefile/obstacles.shp", "shapefile/guidance.shp"),
+        (
+            "shapefile/boundary.shp",
+            "shapefile/obstacles.shp",
+            *(f"shapefile/obstacles_{status}.shp" for status in schema.NOT_AVOIDED),
+            "shapefile/guidance.shp",
+        ),
         ("field", "obstacles", "segments"),
         "geofield.formats.shapefile:write",
         "geofield.formats.shapefile:read",

@@ -65,7 +65,8 @@ def write_datasets(
         Name of the products that are one file.
     overwrite : bool
         Whether products that are there already may be replaced; a GeoPackage stays beside the new
-        one as ``.bak``, and what a person keeps in it comes along.
+        one as ``.bak``, and what a person keeps in it comes along. Files of layers that a product
+        has no more go.
     options : mapping, optional
         Options of the writers (see `Format.options`); each writer gets those it knows. Under
         a format's name stands a mapping of options for it alone.
@@ -107,7 +108,8 @@ def write_datasets(
     tell_blocked(datasets, refuse=any(each.steers for each in chosen))
     target = Path(folder)
     written: list[Path] = []
-    with staged_folder(target, overwrite=overwrite, inputs=inputs) as staging:
+    products = [each.places(target) for each in chosen]
+    with staged_folder(target, overwrite=overwrite, inputs=inputs, products=products) as staging:
         for each in chosen:
             own = {key: value for key, value in given.items() if key in each.options}
             own |= given.get(each.name, {})

@@ -8,16 +8,20 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib.util import find_spec
-from pathlib import Path
+from pathlib import Path, PurePath
 from pkgutil import resolve_name
 from typing import Any, Literal
 
+from geofield import schema
 from geofield.errors import FormatError
 from geofield.model import Dataset
 
 Writer = Callable[..., list[Path]]
 Reader = Callable[..., Dataset]
 Validator = Callable[[Path], Iterable[Any]]
+
+#: The parts of a Shapefile, and the index that other programs put beside it.
+_BESIDE_SHP = (".shx", ".dbf", ".prj", ".cpg", ".qix")
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +128,22 @@ class Format:
     several: str | None = None
     pictured: bool = False
     drawn_by: str | None = None
+
+    def places(self, folder: Path) -> set[Path]:
+        """The files of a product in a folder that all plans give one name, by their layers."""
+        names = {
+            file.replace("<layer>", layer.name)
+            for file in self.files
+            if "{stem}" not in file and "<name>" not in file
+            for layer in schema.LAYERS
+        }
+        beside = {
+            str(PurePath(name).with_suffix(suffix))
+            for name in names
+            if name.endswith(".shp")
+            for suffix in _BESIDE_SHP
+        }
+        return {folder / name for name in names | beside}
 
     def refuse_undrawn(self) -> None:
         """Refuse what nothing here draws, before any work is done.

@@ -25,6 +25,8 @@ from geofield.stop_signals import STOP_SIGNALS
 PREFIX = ".geofield-"
 #: The file of a staging folder whose products are being moved into place.
 MOVING = "moving"
+#: The folder of one whose files say by their places which files of an earlier product go.
+LEAVING = "leaving"
 _LOCK = "lock"
 #: What is left of a folder that was being removed, without a lock perhaps.
 _GONE = PREFIX + "gone-"
@@ -199,12 +201,16 @@ def _sweep_old(staging: Path) -> None:
 
 
 def _finish(staging: Path, target: Path) -> None:
-    """Move the rest into place, unless something was changed there since."""
+    """Move the rest into place and remove what goes, unless something was changed there since."""
     since = (staging / MOVING).stat().st_mtime_ns
-    work = staging / "new"
-    rest = [(file, target / file.relative_to(work)) for file in work.rglob("*") if file.is_file()]
-    if any(place.exists() and place.stat().st_mtime_ns > since for _, place in rest):
+    rest, gone = (
+        [(file, target / file.relative_to(of)) for file in of.rglob("*") if file.is_file()]
+        for of in (staging / "new", staging / LEAVING)
+    )
+    if any(place.exists() and place.stat().st_mtime_ns > since for _, place in (*rest, *gone)):
         return
+    for _, place in gone:
+        place.unlink(missing_ok=True)
     for file, place in rest:
         place.parent.mkdir(parents=True, exist_ok=True)
         file.replace(place)

@@ -13,7 +13,7 @@ import os
 import shutil
 import sqlite3
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
@@ -21,13 +21,17 @@ from geofield.errors import FormatError, FormatWarning, OutputExistsError
 from geofield.notes import warn
 from geofield.staging.claims import Seen, before_work, refuse_changed, refuse_claimed, seen
 from geofield.staging.folders import cannot_write, made_folder, refuse_locked
-from geofield.staging.leftovers import MOVING, alone, sweep, unstopped, working_folder
+from geofield.staging.leftovers import LEAVING, MOVING, alone, sweep, unstopped, working_folder
 from geofield.strangers import picture_file
 
 
 @contextmanager
 def staged_folder(
-    folder: Path | str, *, overwrite: bool = False, inputs: Iterable[Path | str] = ()
+    folder: Path | str,
+    *,
+    overwrite: bool = False,
+    inputs: Iterable[Path | str] = (),
+    products: Iterable[Collection[Path]] = (),
 ) -> Iterator[Path]:
     """An empty folder whose files appear in `folder` when the block ends well.
 
@@ -39,6 +43,9 @@ def staged_folder(
         Whether products that are there already may be replaced.
     inputs : iterable of Path
         Files read for this work: none of them is ever replaced.
+    products : iterable of collection of Path
+        Files that are one product: where some of them are written, those of an earlier one that
+        are not go.
 
     Yields
     ------
@@ -69,7 +76,7 @@ def staged_folder(
             work.mkdir()
             yield work
             with alone(target), unstopped():
-                _publish(work, target, staging, overwrite, inputs, before)
+                _publish(work, target, staging, overwrite, inputs, before, products)
         except OSError as error:
             raise cannot_write(target, error) from error
         except sqlite3.OperationalError as error:
@@ -101,13 +108,18 @@ def _publish(
     overwrite: bool,
     inputs: Iterable[Path | str],
     before: Seen,
+    products: Iterable[Collection[Path]],
 ) -> None:
     files = sorted(path for path in work.rglob("*") if path.is_file())
     pairs = [(path, target / path.relative_to(work)) for path in files]
     places = [place for _, place in pairs]
+    whole = {
+        file for product in products if not set(product).isdisjoint(places) for file in product
+    }
+    gone = sorted(filter(Path.is_file, whole.difference(places)))
     refuse_claimed(target, {place.relative_to(target).parts[0] for place in places})
-    refuse_changed(target, places, before)
-    for place in places:
+    refuse_changed(target, [*places, *gone], before)
+    for place in (*places, *gone):
         if not place.parent.resolve().is_relative_to(target.resolve()):
             raise FormatError(
                 f"{place.parent} is a link that leads out of {target}: nothing was written.",
@@ -119,20 +131,24 @@ def _publish(
         # What came into place together has one time: none of it is older than the rest.
         os.utime(path, ns=(now_ns, now_ns))
     links = {place: place.resolve() for place in places if place.is_symlink()}
-    _move(pairs, target, staging)
+    _move(pairs, gone, target, staging)
     for place, led_to in links.items():
         words = f"{place} was a link to {led_to}, which stays as it was; it is a file now."
         warn(words, FormatWarning)
     before |= seen(target, places)  # a claim may write more than once
 
 
-def _move(pairs: list[tuple[Path, Path]], target: Path, staging: Path) -> None:
-    """Move all files into place, or none."""
+def _move(pairs: list[tuple[Path, Path]], gone: list[Path], target: Path, staging: Path) -> None:
+    """Move all files into place and remove what is gone, or nothing of it."""
     old = staging / "old"
     moved: list[tuple[Path, Path | None]] = []
+    for place in gone:
+        note = staging / LEAVING / place.relative_to(target)
+        note.parent.mkdir(parents=True, exist_ok=True)
+        note.touch()
     (staging / MOVING).touch()
     try:
-        for source, place in pairs:
+        for source, place in (*pairs, *((None, place) for place in gone)):
             place.parent.mkdir(parents=True, exist_ok=True)
             kept = None
             if place.exists():
@@ -140,9 +156,12 @@ def _move(pairs: list[tuple[Path, Path]], target: Path, staging: Path) -> None:
                 kept.parent.mkdir(parents=True, exist_ok=True)
                 _keep(place, kept)
                 with suppress(OSError):  # a file system without modes
-                    shutil.copymode(place, source)
+                    shutil.copymode(place, source or kept)
             moved.append((place, kept))
-            source.replace(place)
+            if source is None:
+                place.unlink()
+            else:
+                source.replace(place)
     except BaseException:
         # BaseException: nothing that comes between two moves may leave a mixture.
         for place, kept in reversed(moved):
