@@ -345,11 +345,24 @@ def test_a_geopackage_that_another_program_edits_is_left_alone(plan: Path) -> No
             run_geofield("field", nowhere, *at, "-o", plan, "--overwrite"),
             run_geofield("obstacles", nowhere, plan, "-o", plan),
         ]
+        # What may not be replaced at all is told first: closing it elsewhere would not help.
+        parcel = plan.with_name("parcel.geojson")
+        parcel.write_text("no parcel")
+        taken = [
+            run_geofield("field", nowhere, *at, "-o", plan),
+            run_geofield("import", parcel, "-o", plan),
+            run_geofield("tracks", parcel, "--spacing", 4, "-o", plan),
+        ]
+        itself = run_geofield("import", plan, "-o", plan, "--overwrite")
     finally:
         kill(holder)
     for each in (done, *early):
         assert each.returncode == 1
         assert "open in another program" in each.stderr
+    for each in taken:
+        assert each.returncode == 1
+        assert f"{plan} is there already." in each.stderr
+    assert f"{plan} is an input of this work" in itself.stderr
     assert plan.read_bytes() == before
 
 

@@ -1405,8 +1405,8 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>Replace the output where it exists.</source>
-      <translation>Das Ergebnis ersetzen, wenn es schon da ist.</translation>
+      <source>Replace the output where it exists; an outline drawn by hand is kept.</source>
+      <translation>Das Ergebnis ersetzen, wenn es schon da ist; ein von Hand gezeichneter Umriss bleibt.</translation>
     </message>
     <message>
       <location filename="description.py" />

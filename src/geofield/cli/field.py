@@ -21,7 +21,6 @@ from geofield.cli.options import (
 )
 from geofield.cli.parcels import boundary_options, parcel_and_point
 from geofield.cli.refresh import say_outdated, say_removed
-from geofield.errors import OutputExistsError
 from geofield.settings import as_before, with_values
 from geofield.wording import counted
 
@@ -52,7 +51,11 @@ Examples (on the project's own sample):
     type=FILE,
     help="GeoPackage to write; an outline that a person drew in it is kept.",
 )
-@click.option("--overwrite", is_flag=True, help="Replace the output where it exists.")
+@click.option(
+    "--overwrite",
+    is_flag=True,
+    help="Replace the output where it exists; an outline drawn by hand is kept.",
+)
 @click.option("--fresh", is_flag=True, help="With --overwrite: forget what a person edited there.")
 @click.option(
     "--list",
@@ -125,14 +128,8 @@ def field(
     tell_idle(chosen, parcel=parcel is not None)
     previous = None
     if output is not None:
-        claim_plan(output)
+        claim_plan(output, overwrite=overwrite)
         if output.is_file():
-            if not overwrite:
-                raise OutputExistsError(
-                    f"{output} is there already.",
-                    hint="Choose another name, or --overwrite: an outline drawn by hand is then "
-                    "kept.",
-                )
             previous = None if fresh else read_plan(output)
     seen = showing(settings, lat, lon, known_outline(parcel, previous, lat, lon))
     source = imagery_of(imagery, seen, (lon, lat), acknowledged=acknowledge_terms)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -60,18 +60,24 @@ def output_option(help_text: str, kind: click.Path = FILE) -> Callable[[Command]
 
 
 def claim_folder(
-    folder: Path, names: Collection[str] | None = None, *, replaced: Collection[str] = ()
+    folder: Path,
+    names: Collection[str] | None = None,
+    *,
+    replaced: Collection[str] = (),
+    overwrite: bool = True,
+    inputs: Iterable[Path | str] = (),
 ) -> None:
     """Claim a folder, or some names in it, until the command ends, before it reads what is there.
 
     Raises
     ------
     OutputExistsError
-        Another geofield works there.
+        Another geofield works there, or a file that would be `replaced` is there.
     FormatError
-        A file that will be `replaced` cannot be: it is read-only, or open in another program.
+        Such a file cannot be replaced: it is an input, read-only, or open in another program.
     """
-    click.get_current_context().with_resource(claimed(folder, names, replaced=replaced))
+    claim = claimed(folder, names, replaced=replaced, overwrite=overwrite, inputs=inputs)
+    click.get_current_context().with_resource(claim)
     tell_unsaved(folder, names)
 
 
@@ -91,14 +97,23 @@ def tell_unsaved(folder: Path, names: Collection[str] | None = None) -> None:
             )
 
 
-def claim_file(output: Path) -> None:
-    """The same for one file."""
-    claim_folder(output.parent, (output.name,), replaced=(output.name,))
+def claim_file(
+    output: Path,
+    *,
+    overwrite: bool,
+    inputs: Iterable[Path | str] = (),
+    renewed: Path | None = None,
+) -> None:
+    """The same for one file; the plan that is `renewed` may be replaced by itself."""
+    if renewed is not None and output.exists() and output.samefile(renewed):
+        overwrite = True
+    name = (output.name,)
+    claim_folder(output.parent, name, replaced=name, overwrite=overwrite, inputs=inputs)
 
 
-def claim_plan(output: Path) -> None:
+def claim_plan(output: Path, **how: Any) -> None:
     """The same for a plan that a stage will write; another name than a GeoPackage's is refused."""
     from geofield.plan_files import refuse_other_names
 
     refuse_other_names(output)
-    claim_file(output)
+    claim_file(output, **how)

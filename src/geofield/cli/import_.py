@@ -55,7 +55,7 @@ def import_(
     from geofield.formats.importing import read_together, recorded
     from geofield.plan_files import staged_plan
 
-    claim_plan(output)
+    claim_plan(output, overwrite=overwrite, inputs=files)
     dataset = recorded(read_together(files, crs=crs, name=name))
     with staged_plan(output, overwrite=overwrite, inputs=files) as staging:
         shown = {"picture": dataset.picture_lies_in(output.parent)}

@@ -11,7 +11,6 @@ from geofield.cli.files import OLD_FILE, claim_plan, output_option
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import continued, defaults_option, stage_options, tell_idle
 from geofield.cli.refresh import say_outdated, say_removed
-from geofield.errors import OutputExistsError
 from geofield.settings import Settings
 from geofield.wording import counted
 
@@ -54,12 +53,7 @@ def obstacles(
 
     if imagery.lower().endswith(".gpkg") and plan_file.suffix.lower() != ".gpkg":
         raise click.UsageError("The picture comes first: geofield obstacles IMAGERY FIELD.gpkg.")
-    claim_plan(output)
-    if output.exists() and not overwrite and not output.samefile(plan_file):
-        # Said at once, not after the work.
-        raise OutputExistsError(
-            f"{output} is there already.", hint="Choose another name, or --overwrite."
-        )
+    claim_plan(output, overwrite=overwrite, inputs=[imagery], renewed=plan_file)
     plan = read_plan(plan_file)
     if not defaults:
         settings = continued(settings, plan.settings, "obstacles")

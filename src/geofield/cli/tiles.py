@@ -156,7 +156,7 @@ def tiles(
         acknowledged=acknowledge_terms,
     )
     if output.parent.is_dir():  # else it is told below
-        claim_file(output)
+        claim_file(output, overwrite=overwrite, inputs=[source])
     middle_lat, middle_lon = where.point
     found = resolve(
         source,

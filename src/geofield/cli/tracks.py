@@ -100,7 +100,7 @@ def tracks(
     """
     from geofield.farm.work import Job
 
-    (claim_file if output.suffix else claim_folder)(output)
+    _claim(output, file, overwrite=overwrite)
     tell_unsaved(file.parent, (file.name,))
     notes: list[str] = []
     with telling(notes):
@@ -150,6 +150,14 @@ def tracks(
             f"{', '.join(list(failed)[:5])}{', ...' if len(failed) > 5 else ''}.",
             hint="The reasons are above; all other fields were written.",
         )
+
+
+def _claim(output: Path, file: Path, *, overwrite: bool) -> None:
+    """Claim the file or the folder that is written."""
+    if output.suffix:
+        claim_file(output, overwrite=overwrite, renewed=file)
+    else:
+        claim_folder(output)
 
 
 def _own_plan(file: Path, settings: Settings) -> Plan | None:

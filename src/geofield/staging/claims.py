@@ -18,7 +18,7 @@ from collections.abc import Collection, Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 
-from geofield.errors import OutputExistsError
+from geofield.errors import FormatError, OutputExistsError
 from geofield.staging.folders import (
     cannot_write,
     log_of,
@@ -27,6 +27,7 @@ from geofield.staging.folders import (
     written_ns,
 )
 from geofield.staging.leftovers import PREFIX, alone, is_living, sweep, working_folder
+from geofield.strangers import picture_file
 
 _CLAIM = "claim"
 #: Of folders, in which what lay there is remembered; deeper lies only what plans are sent on as.
@@ -42,21 +43,26 @@ _MINE: dict[str, tuple[Path, Seen]] = {}
 
 @contextmanager
 def claimed(
-    folder: Path | str, names: Collection[str] | None = None, *, replaced: Collection[str] = ()
+    folder: Path | str,
+    names: Collection[str] | None = None,
+    *,
+    replaced: Collection[str] = (),
+    overwrite: bool = True,
+    inputs: Iterable[Path | str] = (),
 ) -> Iterator[None]:
     """Be the only geofield that works on a folder's products until the block ends.
 
     What the block then writes there by `staging` replaces nothing that was changed since it began.
     `names` are the files and folders in it that are claimed; all of it without. A missing folder is
     made, and removed again when nothing comes into it. Of files that will be `replaced` it is told
-    at once that they cannot be.
+    at once that they cannot be, as when they are written (see `staged_folder`).
 
     Raises
     ------
     OutputExistsError
-        Another process holds them.
+        Another process holds them, or a file is there already and `overwrite` is false.
     FormatError
-        A file that will be replaced is read-only, or open in another program.
+        A file that will be replaced is one of the `inputs`, read-only, or open in another program.
     """
     target = Path(folder)
     with ExitStack() as held:
@@ -65,7 +71,7 @@ def claimed(
             sweep(target, certain=certain)
             refuse_claimed(target, names)
             for place in filter(Path.is_file, (target / name for name in replaced)):
-                refuse_locked(place)
+                refuse_place(place, overwrite, inputs)
             try:
                 _fold_in_logs(target)
                 sign = held.enter_context(working_folder(target))
@@ -81,6 +87,24 @@ def claimed(
         _MINE[sign.name] = target.resolve(), before
         held.callback(_MINE.pop, sign.name)
         yield
+
+
+def refuse_place(place: Path, overwrite: bool, inputs: Iterable[Path | str]) -> None:
+    """Refuse a place that may not be written or replaced."""
+    if place.resolve() in {picture_file(path).resolve() for path in inputs}:
+        raise FormatError(
+            f"{place} is an input of this work and would be overwritten.",
+            hint="Write to another file or folder.",
+        )
+    if place.is_dir():
+        raise FormatError(f"{place} is a folder.", hint="Choose another name.")
+    if place.exists():
+        if not overwrite:
+            raise OutputExistsError(
+                f"{place} is there already.",
+                hint="Choose another name or folder, or allow overwriting (--overwrite).",
+            )
+        refuse_locked(place)
 
 
 def refuse_claimed(folder: Path, names: Collection[str] | None) -> None:

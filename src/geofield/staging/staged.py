@@ -17,12 +17,18 @@ from collections.abc import Collection, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from geofield.errors import FormatError, FormatWarning, OutputExistsError
+from geofield.errors import FormatError, FormatWarning
 from geofield.notes import warn
-from geofield.staging.claims import Seen, before_work, refuse_changed, refuse_claimed, seen
-from geofield.staging.folders import cannot_write, made_folder, refuse_locked
+from geofield.staging.claims import (
+    Seen,
+    before_work,
+    refuse_changed,
+    refuse_claimed,
+    refuse_place,
+    seen,
+)
+from geofield.staging.folders import cannot_write, made_folder
 from geofield.staging.leftovers import LEAVING, MOVING, alone, sweep, unstopped, working_folder
-from geofield.strangers import picture_file
 
 
 @contextmanager
@@ -96,7 +102,7 @@ def staged_file(
     before the work, not after it.
     """
     target, inputs = Path(path), tuple(inputs)
-    _refuse(target, overwrite, inputs)
+    refuse_place(target, overwrite, inputs)
     with staged_folder(target.parent, overwrite=overwrite, inputs=inputs) as folder:
         yield folder / target.name
 
@@ -125,7 +131,7 @@ def _publish(
                 f"{place.parent} is a link that leads out of {target}: nothing was written.",
                 hint="Remove the link, or write to another folder.",
             )
-        _refuse(place, overwrite, inputs)
+        refuse_place(place, overwrite, inputs)
     now_ns = time.time_ns()
     for path in files:
         # What came into place together has one time: none of it is older than the rest.
@@ -176,24 +182,6 @@ def _move(pairs: list[tuple[Path, Path]], gone: list[Path], target: Path, stagin
                     raise
         (staging / MOVING).unlink()
         raise
-
-
-def _refuse(place: Path, overwrite: bool, inputs: Iterable[Path | str]) -> None:
-    """Refuse a place that may not be written or replaced."""
-    if place.resolve() in {picture_file(path).resolve() for path in inputs}:
-        raise FormatError(
-            f"{place} is an input of this work and would be overwritten.",
-            hint="Write to another file or folder.",
-        )
-    if place.is_dir():
-        raise FormatError(f"{place} is a folder.", hint="Choose another name.")
-    if place.exists():
-        if not overwrite:
-            raise OutputExistsError(
-                f"{place} is there already.",
-                hint="Write to another folder, or allow overwriting (--overwrite).",
-            )
-        refuse_locked(place)
 
 
 def _keep(place: Path, kept: Path) -> None:
