@@ -448,7 +448,7 @@ def test_an_empty_plan_has_no_dead_buttons_and_a_telephone_shows_the_whole_field
             dead = [
                 name
                 for name in ("previous", "next", "confirm", "reject")
-                if page.run(f"return document.getElementById('{name}').disabled")
+                if page.run(f"return document.getElementById('{name}').ariaDisabled === 'true'")
             ]
             assert dead == ["previous", "next", "confirm", "reject"]
             seen = driver.execute_async_script(
@@ -572,7 +572,7 @@ def test_a_tool_that_was_taken_before_the_answer_is_kept(page: Page) -> None:
     page.drag((x - 60, y), (x + 60, y + 9), steps=2)
     page.press("a")
     half_drag(page, page.pixel(x + 20, y + 20))
-    page.wait(lambda: not page.driver.find_element(By.ID, "undo").get_property("disabled"))
+    page.wait(lambda: page.run("return document.getElementById('undo').ariaDisabled") == "false")
     time.sleep(0.2)
     page.driver.execute_cdp_cmd("Network.emulateNetworkConditions", {**slow, "latency": 0})
     ActionChains(page.driver).release().perform()
@@ -608,7 +608,7 @@ def test_an_answer_takes_nothing_out_of_the_hand(page: Page, tool: str) -> None:
     page.driver.execute_cdp_cmd("Network.emulateNetworkConditions", slow)
     page.drag((x, y), (x + 8, y), steps=2)
     half_drag(page, page.pixel(x + 8, y))
-    page.wait(lambda: not page.driver.find_element(By.ID, "undo").get_property("disabled"))
+    page.wait(lambda: page.run("return document.getElementById('undo').ariaDisabled") == "false")
     assert right() - before == pytest.approx(14, abs=0.5)
     page.driver.execute_cdp_cmd("Network.emulateNetworkConditions", {**slow, "latency": 0})
     ActionChains(page.driver).release().perform()

@@ -25,7 +25,8 @@ import('/map.js').then(({sources}) => {
     listed: [...document.querySelectorAll('#list button')].map(one => Number(one.dataset.no)),
     outline: drawn('outline').map(shape)[0],
     tracks: drawn('tracks').map(one => [one.get('no'), one.getGeometry().getCoordinates()]),
-    notes: id('notes').childElementCount, undo: !id('undo').disabled, redo: !id('redo').disabled,
+    notes: id('notes').childElementCount,
+    undo: id('undo').ariaDisabled === 'false', redo: id('redo').ariaDisabled === 'false',
   });
 });
 """

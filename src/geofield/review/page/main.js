@@ -69,6 +69,9 @@ async function act(work, after) {
 
 // -- showing -----------------------------------------------------------------------------
 
+// What does nothing now says so; the keyboard stays on it, as it would not on one that is `disabled`.
+const able = (name, can) => { $(name).ariaDisabled = String(!can); };
+
 function show(answer) {
   state = {...state, ...answer};
   if (chosen !== null && !row(chosen)) chosen = null;
@@ -83,9 +86,7 @@ function show(answer) {
     // What is typed and was not applied yet stays beside other edits.
     if (input.dataset.shown !== value) input.value = input.dataset.shown = value;
   }
-  $("undo").disabled = !state.can_undo;
-  $("redo").disabled = !state.can_redo;
-  $("save").disabled = !unsaved();
+  for (const [name, can] of [["undo", state.can_undo], ["redo", state.can_redo], ["save", unsaved()]]) able(name, can);
   $("title").textContent = state.name;
   // The list of a farm's fields says it, too.
   $("title").classList.toggle("spoken", state.plans.length > 1 && state.plans[state.plan].startsWith(state.name));
@@ -160,7 +161,7 @@ function showList() {
     return item;
   }));
   if (focused) $("list").querySelector(`[data-no="${focused}"]`)?.focus();
-  for (const name of ["previous", "next"]) $(name).disabled = !all;
+  for (const name of ["previous", "next"]) able(name, all > 0);
   showChosen();
 }
 
@@ -168,7 +169,7 @@ function showChosen() {
   for (const press of $("list").querySelectorAll("button"))
     press.setAttribute("aria-current", String(Number(press.dataset.no) === chosen));
   $("list").querySelector('[aria-current="true"]')?.scrollIntoView({block: "nearest"});
-  for (const name of ["confirm", "reject"]) $(name).disabled = chosen === null;
+  for (const name of ["confirm", "reject"]) able(name, chosen !== null);
 }
 
 function choose(no, zoom) {
@@ -352,9 +353,9 @@ async function start() {
   $("onward").hidden = $("plans-row").hidden;
   $("plans").onchange = ({target}) => goTo(Number(target.value));
   for (const name of ["next", "previous", "confirm", "reject", "undo", "redo", "save", "help", "more", "onward"])
-    $(name).onclick = () => ACTIONS[name]();
+    $(name).onclick = () => $(name).ariaDisabled === "true" || ACTIONS[name]();
   $("language").onchange = ({target}) => { setLanguage(target.value); words(); show({}); };
-  $("settings").oninput = () => { $("save").disabled = !unsaved(); };
+  $("settings").oninput = () => { able("save", unsaved()); };
   $("settings").onsubmit = event => {
     event.preventDefault();
     inTurn(apply);
@@ -378,7 +379,7 @@ async function start() {
   maps.map.updateSize();
   maps.view.fit(maps.sources.outline.getExtent(), {padding: [30, 30, 30, 30]});
   typeAgain();
-  $("save").disabled = !unsaved();
+  able("save", unsaved());
   if (!state.yours) say(t("second"), true, {text: t("take"), act: takeOver});
   else tellWhatCameBack();
   document.body.dataset.ready = "yes";
