@@ -35,6 +35,26 @@ def test_what_gdal_finds_shapes_in_is_imported_exported_and_checked(tmp_path, na
     assert "vector file of another program" in geofield("info", file).stdout
 
 
+@pytest.mark.parametrize("name", ["a.gml", "a.tab", "a.mif", "a.sqlite"])
+def test_it_is_read_in_an_archive_and_in_a_folder_too(tmp_path, name):
+    """A GML file that was fine by itself was "no product that is known" there."""
+    frame = gpd.GeoDataFrame({"name": ["Acre"]}, geometry=[BOX], crs="EPSG:32633")
+    (tmp_path / "in").mkdir()
+    frame.to_file(tmp_path / "in" / name, driver=DRIVERS.get(name, "MapInfo File"))
+    (tmp_path / "in" / "readme.md").write_text("of the office")
+    archive = shutil.make_archive(str(tmp_path / "sent"), "zip", tmp_path / "in")
+    assert geofield("validate", tmp_path / "in").returncode == 0
+    done = geofield("import", archive, "-o", tmp_path / "plan.gpkg", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["rows"] == {"field": 1}
+    done = geofield("tracks", archive, "--spacing", 5, "-o", tmp_path / "tracks.gpkg")
+    assert done.returncode == 0, done.stderr
+    if name == "a.gml":
+        shutil.copy(tmp_path / "in" / name, tmp_path / "in" / "b.gml")
+        done = geofield("import", tmp_path / "in", "-o", tmp_path / "two.gpkg")
+        assert "holds 2 vector files.\nName one of them." in done.stderr
+
+
 def test_a_boundary_of_another_format_around_trees_of_a_usual_one(tmp_path):
     gpd.GeoDataFrame(geometry=[BOX], crs="EPSG:32633").to_file(tmp_path / "a.gml", driver="GML")
     gpd.GeoDataFrame(geometry=TREES, crs="EPSG:32633").to_file(tmp_path / "b.geojson")

@@ -19,7 +19,7 @@ from geofield.errors import CRSError, FormatError, MissingFileError
 from geofield.formats.catalogue import PARQUET
 from geofield.formats.foreign import refuse_layer
 from geofield.formats.gpkg_read import is_own
-from geofield.formats.registry import detect, refuse_no_rows
+from geofield.formats.registry import detect, files_of, refuse_no_rows
 from geofield.formats.row_crs import refuse_other_rows
 from geofield.formats.zipped import unpacked
 from geofield.strangers import check_vector, unreadable
@@ -85,8 +85,7 @@ def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> R
 
 def _only_file(archive: Path, folder: Path, layer: str | None) -> Path:
     """The file of rows in a folder that was unpacked; of several, the one called like `layer`."""
-    suffixes = detect(folder).suffixes
-    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in suffixes)
+    files = files_of(folder, detect(folder))
     if len(files) == 1:
         return files[0]
     if not files:

@@ -139,14 +139,24 @@ def product_files(place: Path, found: Format) -> list[Path]:
     FormatError
         When the folder holds several.
     """
-    if not place.is_dir() or found.reads_folders:
+    if not place.is_dir() or (found.reads_folders and found is not OTHER):
         return [place]
-    files = sorted(file for file in place.iterdir() if file.suffix.lower() in found.suffixes)
+    files = files_of(place, found)
     if len(products(files)) != 1:
-        raise FormatError(
-            f"{place} holds {len(files)} {found.title} files.", hint="Name one of them."
-        )
+        kind = "vector" if found is OTHER else found.title
+        raise FormatError(f"{place} holds {len(files)} {kind} files.", hint="Name one of them.")
     return files
+
+
+def files_of(folder: Path, found: Format) -> list[Path]:
+    """The files of a folder that a format reads; a file geodatabase is one itself."""
+    inside = sorted(folder.iterdir())
+    if found is not OTHER:
+        return [file for file in inside if file.suffix.lower() in found.suffixes]
+    if _has_shapes(folder):
+        return [folder]
+    # The .mif and .mid of MapInfo are one.
+    return list({file.stem: file for file in inside if file.is_file() and _opens(file)}.values())
 
 
 def refuse_no_rows(path: Path) -> None:
@@ -204,7 +214,7 @@ def _detect_folder(folder: Path) -> Format:
     for each in FORMATS.values():
         if each.reader is not None and suffixes & set(each.suffixes):
             return each
-    if _has_shapes(folder):
+    if files_of(folder, OTHER):
         return OTHER
     raise FormatError(
         f"{folder} holds no product that is known.", hint="Name one of its files instead."
@@ -219,6 +229,14 @@ def _has_shapes(place: Path) -> bool:
     try:
         return any(kind is not None for _, kind in pyogrio.list_layers(place))
     except pyogrio.errors.DataSourceError:
+        return False
+
+
+def _opens(file: Path) -> bool:
+    """Whether shapes are found in a file, and nothing in it is refused."""
+    try:
+        return _has_shapes(file)
+    except FormatError:
         return False
 
 
