@@ -55,10 +55,16 @@ def test_two_plans_in_a_folder_are_not_one(linked):
 @pytest.mark.parametrize("product", ["rdf", "isoxml", "agopengps"])
 def test_what_is_not_read_as_rows_is_named_with_the_command_that_reads_it(tmp_path, product):
     write_dataset(make_dataset(), tmp_path / "out", [product])
-    for given in ("tracks", "batch"):
+    place = tmp_path / "out" / ("" if product == "rdf" else product)
+    truth = tmp_path / "truth.geojson"
+    truth.write_text("{}")
+    for given in ("tracks", "batch", "evaluate"):
         out = tmp_path / given
-        told = ("-o", out) if given == "tracks" else ("--out", out)
-        done = geofield(given, tmp_path / "out" / ("" if product == "rdf" else product), *told)
+        told = {"tracks": ("-o", out), "batch": ("--out", out), "evaluate": (truth,)}[given]
+        if given == "evaluate":  # it takes files alone
+            found = ("obstacles.rdf", "TASKDATA.XML", "Boundary.txt")
+            place = next(file for file in place.rglob("*") if file.name in found)
+        done = geofield(given, place, *told)
         assert done.returncode == 1
         assert "is not read as rows" in done.stderr
         assert "`geofield import " in done.stderr

@@ -130,8 +130,10 @@ def _rows(path: Path, layer: str | None) -> gpd.GeoDataFrame:
     """The rows of any vector file, or of a table with positions."""
     from geofield.evaluation import read_obstacles
     from geofield.formats.raw_tables import CSV
+    from geofield.formats.registry import refuse_no_rows
     from geofield.formats.table_positions import read_table
 
+    refuse_no_rows(path)
     if path.suffix.lower() in CSV:
         return read_table(path, None if layer == _USUAL else layer)
     return read_obstacles(path, layer)
