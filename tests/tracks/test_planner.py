@@ -401,6 +401,48 @@ def test_a_track_on_a_border_of_many_vertices_is_whole() -> None:
         assert first.geometry.length.tolist() == pytest.approx([length_m], abs=1e-3)
 
 
+@pytest.mark.parametrize("turned_deg", [0.0, 33.0])
+@pytest.mark.parametrize("mirrored", [1, -1])
+def test_what_only_touches_a_track_takes_nothing_of_it(mirrored: int, turned_deg: float) -> None:
+    """Two sheds that meet corner to corner on it, one along it, and a spike of the field."""
+    middle = (X + 50.0, Y + 6.0)
+
+    def put(shape: Any) -> Any:
+        mirror = affinity.scale(shape, mirrored, 1, origin=middle)
+        return affinity.rotate(mirror, turned_deg, origin=middle)
+
+    how: Any = {"crs": CRS, "spacing_m": 4.0}
+    how["direction"] = put(shapely.LineString([(X, Y + 6.0), (X + 100.0, Y + 6.0)]))
+    sheds = [box(40, 2, 50, 6), box(50, 6, 60, 10), box(20, 6, 30, 9)]
+    stands = gpd.GeoDataFrame(
+        {"radius_m": [np.nan] * 3 + [2.0]},
+        geometry=[put(each) for each in [*sheds, shapely.Point(X + 80.0, Y + 6.0)]],
+        crs=CRS,
+    )
+    planned = plan_tracks(put(box(0, 0, 100, 12)), stands, **how)
+    middle_ones = planned.segments[planned.segments["track_no"] == 2]
+    assert sorted(middle_ones["length_m"]) == pytest.approx([18.0, 78.0], abs=1e-6)
+    assert planned.gaps["length_m"].tolist() == pytest.approx([4.0], abs=1e-6)
+    assert planned.statistics.losses[3].length_m == pytest.approx(4.0, abs=1e-6)
+    assert sum(each.length_m for each in planned.statistics.losses[:3]) < 1e-6
+    ring = [(0, 0), (100, 0), (100, 10), (60, 10), (60, 5), (40, 5), (20, 6), (0, 5)]
+    spiked = plan_tracks(put(Polygon([(X + x, Y + y) for x, y in ring])), **how)
+    assert sorted(spiked.segments["length_m"]) == pytest.approx([40.0, 40.0, 100.0], abs=1e-6)
+
+
+def test_what_stands_on_a_first_track_along_either_border_is_told_as_its_loss() -> None:
+    """Of a track along one of the two borders it was told as none."""
+    tree, shed = shapely.Point(X + 50, Y).buffer(0.1), box(70, -1, 80, 1)
+    for y in (0.0, 12.0):
+        stands = [affinity.translate(each, 0.0, y) for each in (tree, shed)]
+        how: Any = {"direction": shapely.LineString([(X, Y + y), (X + 100, Y + y)])}
+        planned = plan_tracks(box(0, 0, 100, 12), stands, crs=CRS, spacing_m=6.0, **how)
+        told = [each.length_m for each in planned.statistics.losses]
+        assert told == pytest.approx([0.2, 10.0], abs=1e-6)
+        share = 100.0 * 10.0 / 300.0
+        assert planned.statistics.losses[1].percent == pytest.approx(share, abs=1e-5)
+
+
 def test_headland() -> None:
     field = box(0, 0, 100, 60)
     tracks = plan_tracks(field, circles((3, 30, 2)), crs=CRS, spacing_m=4.0, headland_m=8.0)

@@ -57,8 +57,8 @@ class Crossings:
     free: NDArray[np.bool_]
     raw_piece: IntArray
     last_kept: IntArray
-    above: NDArray[np.int8] | None = None
-    """Marks the crossings of the sweep above, where there are others too."""
+    sweeps: tuple[NDArray[np.int8], ...]
+    """Marks the crossings of each sweep: one for all, or one above the tracks and one below."""
 
 
 def clip_tracks(
@@ -74,19 +74,15 @@ def clip_tracks(
     those of the field (owner ``FIELD``) and of polygonal obstacles; `discs` are cut as true
     circles. Pieces shorter than `min_length_m` are not driven: they become part of the gap.
     """
-    track, u, enters, owner, both = _all_crossings(positions, edges, discs)
+    track, u, enters, owner, marks = _all_crossings(positions, edges, discs)
     # Sorting by place and then, stably, by track: a radix sort for 16-bit track numbers.
     by_place = np.argsort(u)
     small = np.int16 if len(positions) < 2**15 else np.int64
     order = by_place[np.argsort(track[by_place].astype(small), kind="stable")]
     track, u, enters, owner = track[order], u[order], enters[order], owner[order]
     weight = np.where(owner == FIELD, enters.astype(np.int64), -_BLOCK * enters.astype(np.int64))
-    above = None
-    if both is None:
-        free = np.cumsum(weight) > 0
-    else:
-        above, below = both[0][order], both[1][order]
-        free = (np.cumsum(weight * above) > 0) | (np.cumsum(weight * below) > 0)
+    sweeps = tuple(each[order] for each in marks) or (np.ones(1, np.int8),)
+    free = np.logical_or.reduce([np.cumsum(weight * each) > 0 for each in sweeps])
     before = np.empty_like(free)
     before[:1] = False
     before[1:] = free[:-1]
@@ -116,7 +112,7 @@ def clip_tracks(
         seen = np.cumsum(keep) - 1
         last_kept[1:] = np.where(seen >= 0, group[seen], -1)
     crossings = Crossings(
-        track, u, enters, owner, free, np.cumsum(free & ~before), last_kept, above
+        track, u, enters, owner, free, np.cumsum(free & ~before), last_kept, sweeps
     )
     return Pieces(piece_track, start, end), crossings
 
@@ -128,9 +124,9 @@ def _all_crossings(
     FloatArray,
     NDArray[np.int8],
     IntArray,
-    tuple[NDArray[np.int8], NDArray[np.int8]] | None,
+    list[NDArray[np.int8]],
 ]:
-    """Find every crossing; `both` marks those of the sweep above and of the sweep below."""
+    """Find every crossing, and mark those of the sweep above and of the sweep below, if two."""
     count = len(positions)
     va, vb = edges.va, edges.vb
     # For each vertex: the first track at or above it, and whether it lies on that track.
@@ -147,7 +143,7 @@ def _all_crossings(
         positions, edges, va=va, vb=vb, at_a=at[:n], at_b=at[n:], upper=False
     )
     parts = [(track, u, enters, owner)]
-    both = None
+    marks: list[NDArray[np.int8]] = []
     if touched:
         hit = np.zeros(count, dtype=bool)
         hit[at[on]] = True
@@ -157,18 +153,17 @@ def _all_crossings(
         )
         wanted = hit[more[0]]
         parts.append((more[0][wanted], more[1][wanted], more[2][wanted], more[3][wanted]))
-        above = [np.ones(len(track), np.int8), np.zeros(int(wanted.sum()), np.int8)]
-        below = [(~hit[track]).astype(np.int8), np.ones(int(wanted.sum()), np.int8)]
+        others = np.ones(int(wanted.sum()), np.int8)
+        marks = [
+            np.append(np.ones(len(track), np.int8), 0 * others),
+            np.append((~hit[track]).astype(np.int8), others),
+        ]
     if discs is not None and len(discs):
         parts.append(_disc_crossings(positions, discs))
-        if touched:
-            above.append(np.ones(len(parts[-1][0]), np.int8))
-            below.append(np.ones(len(parts[-1][0]), np.int8))
-    if touched:
-        both = (np.concatenate(above), np.concatenate(below))
+        marks = [np.append(each, np.ones(len(parts[-1][0]), np.int8)) for each in marks]
     if len(parts) > 1:
         track, u, enters, owner = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return track, u, enters, owner, both
+    return track, u, enters, owner, marks
 
 
 def _edge_crossings(

@@ -37,23 +37,29 @@ def gap_causes(pieces: Pieces, crossings: Crossings) -> tuple[IntArray, IntArray
 def obstacle_losses(crossings: Crossings, obstacle_count: int) -> FloatArray:
     """Length of track lost to each obstacle, metres.
 
-    A stretch inside several obstacles is shared evenly among them, so that the losses add up to
-    what all obstacles together cost. Owners beyond their count are no obstacles: what is barred
-    by one of these is lost to none.
+    A stretch inside several obstacles is shared evenly among them, and so is one along which they
+    stand on either side: the losses add up to what all obstacles together cost. Owners beyond their
+    count are no obstacles: what is barred by one of these is lost to none.
     """
     if not obstacle_count or not len(crossings.u):
         return np.zeros(obstacle_count)
-    once = slice(None) if crossings.above is None else np.flatnonzero(crossings.above)
-    u, owner = crossings.u[once], crossings.owner[once]
-    enters = crossings.enters[once].astype(np.int64)
-    is_field = owner == FIELD
-    mine = ~is_field & (owner < obstacle_count)
-    field_depth = np.cumsum(np.where(is_field, enters, 0))
-    depth = np.cumsum(np.where(mine, enters, 0))
-    barred = np.cumsum(np.where(is_field | mine, 0, enters)) > 0
-    width = np.diff(u, append=u[-1:])
-    counted = (field_depth > 0) & (depth > 0) & ~barred
-    share = np.where(counted, width / np.maximum(depth, 1), 0.0)
-    before = np.concatenate(([0.0], np.cumsum(share)[:-1]))
-    lost = np.bincount(owner[mine], -enters[mine] * before[mine], obstacle_count)
+    is_field = crossings.owner == FIELD
+    mine = ~is_field & (crossings.owner < obstacle_count)
+    each = [crossings.enters.astype(np.int64) * sweep for sweep in crossings.sweeps]
+    depths = np.array([np.cumsum(np.where(mine, enters, 0)) for enters in each])
+    counted = np.array([
+        (np.cumsum(np.where(is_field, enters, 0)) > 0)
+        & (np.cumsum(np.where(is_field | mine, 0, enters)) <= 0)
+        & (depth > 0)
+        & ~crossings.free
+        for enters, depth in zip(each, depths, strict=True)
+    ])  # fmt: skip
+    width = np.diff(crossings.u, append=crossings.u[-1:])
+    shares = np.where(counted, width / np.maximum(depths * counted.sum(axis=0), 1), 0.0)
+    before = np.cumsum(np.pad(shares[:, :-1], ((0, 0), (1, 0))), axis=1)
+    owner = crossings.owner[mine]
+    lost = sum(
+        np.bincount(owner, -enters[mine] * sums[mine], obstacle_count)
+        for enters, sums in zip(each, before, strict=True)
+    )
     return np.maximum(lost, 0.0)
