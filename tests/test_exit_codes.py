@@ -447,3 +447,19 @@ def test_a_folder_that_is_gone_is_told(tmp_path: Path) -> None:
     assert done.returncode == 1
     assert "The folder that this was started in is gone." in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "import URL -o x.gpkg",
+        "tracks URL --spacing 4 -o x.gpkg",
+        "run PICTURE POINT --boundary URL --spacing 4 --out x",
+        "obstacles PICTURE URL -o x.gpkg",
+    ],
+)
+def test_vector_files_are_not_read_from_addresses(place: Place, line: str) -> None:
+    done = place.geofield(line.replace("URL", "https://example.org/a.geojson"))
+    assert done.returncode == 2
+    assert "https://example.org/a.geojson is an address" in done.stderr
+    assert "download the file" in done.stderr

@@ -27,6 +27,14 @@ class NamedPath(click.Path):
         """The path."""
         if value == "":
             self.fail("it is empty: give a name.", param, ctx)
+        given = self.exists or isinstance(param, click.Argument)
+        if given and str(value).lower().startswith(("http://", "https://")):
+            self.fail(
+                f"{value} is an address, from which only pictures are read: download the file, "
+                "and name that.",
+                param,
+                ctx,
+            )
         if value == "-" and not self.exists:
             self.fail("standard input and output are not used here: give a name.", param, ctx)
         if isinstance(param, click.Option) and str(value).startswith("-") and not self.exists:

@@ -11,7 +11,7 @@ from click.core import ParameterSource
 
 from geofield.cli.console import echo_json, progress_bar, say_note
 from geofield.cli.degrees import Degrees
-from geofield.cli.files import FOLDER, OLD_FILE, claim_file, output_option
+from geofield.cli.files import FOLDER, OLD_FILE, claim_folder, output_option
 from geofield.cli.options import Number, acknowledge_option, stage_options
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ def tiles(
         acknowledged=acknowledge_terms,
     )
     if output.parent.is_dir():  # else it is told below
-        claim_file(output, overwrite=overwrite, inputs=[source])
+        claim_folder(output.parent, (output.name,))
     middle_lat, middle_lon = where.point
     found = resolve(
         source,
