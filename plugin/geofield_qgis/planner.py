@@ -196,7 +196,7 @@ class Planner(QObject):
                 each.reset(QgsWkbTypes.GeometryType.PolygonGeometry)
             (row,) = result.data["fields"]
             self._say(
-                tr("{0} tracks, {1} km. Shift+click adds ground, Alt+click takes it away.").format(
+                tr("Tracks: {0}, {1} km. Shift+click adds ground, Alt+click takes it away.").format(
                     row["track_count"], number(row["length_m"] / 1000, 1)
                 ),
                 good=True,

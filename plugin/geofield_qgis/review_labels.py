@@ -82,7 +82,7 @@ class ReviewLabels(QWidget):
     def tell_figures(self, answer: Mapping[str, Any]) -> None:
         """Tell of tracks that the engine planned."""
         figures = answer["figures"]
-        text = tr("{0} tracks in {1} segments, {2} km").format(
+        text = tr("Tracks: {0}, segments: {1}, {2} km").format(
             figures["tracks"], figures["segments"], number(figures["length_m"] / 1000, 2)
         )
         self.figures.setText("\n".join([text, *answer.get("notes", [])]))

@@ -20,7 +20,7 @@ def test_tracks_follow_the_outline_too(panel, plan):
     # Saved by QGIS's own button, the plan is planned again as well.
     tracks = read_plan(Path(plan)).tracks
     assert by_qgis == [again[0], len(tracks.lines)]
-    assert f"{len(tracks.lines)} tracks in {len(tracks.segments)} segments" in by_qgis[0]
+    assert f"Tracks: {len(tracks.lines)}, segments: {len(tracks.segments)}" in by_qgis[0]
     assert read_plan(Path(plan)).field.method == "drawn"
     assert seen["said"] == []
 

@@ -475,8 +475,8 @@
     </message>
     <message>
       <location filename="planner.py" />
-      <source>{0} tracks, {1} km. Shift+click adds ground, Alt+click takes it away.</source>
-      <translation>{0} Spuren, {1} km. Umschalt+Klick nimmt Boden dazu, Alt+Klick nimmt ihn weg.</translation>
+      <source>Tracks: {0}, {1} km. Shift+click adds ground, Alt+click takes it away.</source>
+      <translation>Spuren: {0}, {1} km. Umschalt+Klick nimmt Boden dazu, Alt+Klick nimmt ihn weg.</translation>
     </message>
     <message>
       <location filename="review.py" />
@@ -545,8 +545,8 @@
     </message>
     <message>
       <location filename="review_labels.py" />
-      <source>{0} tracks in {1} segments, {2} km</source>
-      <translation>{0} Spuren in {1} Abschnitten, {2} km</translation>
+      <source>Tracks: {0}, segments: {1}, {2} km</source>
+      <translation>Spuren: {0}, Abschnitte: {1}, {2} km</translation>
     </message>
     <message>
       <location filename="review_labels.py" />
