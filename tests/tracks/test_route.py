@@ -19,6 +19,7 @@ from geofield.model.tracks import Tracks
 from geofield.tracks import plan_route, plan_tracks
 from geofield.tracks.route.order import track_order
 from geofield.tracks.route.passage import Passage
+from geofield.tracks.route.turns import Turn, plan_turns
 
 #: One unit is one metre on the ground here: a zone of scale 1 along its middle.
 CRS: Any = "+proj=tmerc +lon_0=15 +k=1 +x_0=500000 +datum=WGS84 +units=m"
@@ -329,3 +330,56 @@ def test_vertices_along_a_straight_border_are_no_corners_to_turn_at() -> None:
     passage = Passage(shapely.Polygon(ring), none)
     # 1007, and so 500 000 lines to look along, where each vertex is one.
     assert len(passage._corners[-1].places) == 0
+
+
+def past_a_tree(
+    radius_m: float, before_m: float, spare_m: float
+) -> tuple[Turn, shapely.LineString, float]:
+    """The turn of a machine of 4 m past a tree on its track, its way, the shortest way's length."""
+    circle, no = np.array([[20.0, 0.0, radius_m]]), np.empty(0, object)
+    shapes = ObstacleShapes(circle, np.arange(1), no, np.empty(0, int))
+    passage = Passage(shapely.box(-50, -50, 100, 50), shapes)
+    ends = np.array([[20.0 - radius_m - before_m, 0.0], [20.0 + radius_m + before_m, 0.0]])
+    exits, entries = (np.append(end, 0.0)[None] for end in ends)
+    spare = np.full((1, 2), spare_m)
+    (turn,) = plan_turns(exits, entries, passage, radius_m=4.0, curve="dubins", spare_m=spare)
+    line = shapely.LineString(turn.places)
+    assert line.distance(shapely.Point(20, 0)) > radius_m - 1e-6
+    step, along = np.diff(turn.places, axis=0), ends[:, 0] + [-turn.early_m, turn.late_m]
+    np.testing.assert_allclose(turn.places[[0, -1]], np.column_stack((along, [0, 0])), atol=1e-9)
+    if turn.fits:
+        heading = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
+        length = np.hypot(*step.T)
+        bend = np.abs(np.diff(heading)) / (0.5 * (length[1:] + length[:-1]))
+        assert bend.max() < 1.001 / 4.0
+        # It leaves and joins the track in the track's own direction.
+        assert np.abs(heading[[0, -1]]).max() < 0.05
+    shortest = passage.shortest(*ends)
+    assert shortest is not None
+    return turn, line, float(np.hypot(*np.diff(shortest, axis=0).T).sum())
+
+
+@pytest.mark.parametrize("radius_m", [6.0, 10.0])
+def test_curves_follow_the_shortest_way_around_what_no_single_curve_clears(radius_m: float) -> None:
+    turn, line, shortest_m = past_a_tree(radius_m, before_m=12.0, spare_m=0.0)
+    assert (turn.kind, turn.fits, turn.early_m, turn.late_m) == ("dubins", True, 0.0, 0.0)
+    assert turn.length_m == pytest.approx(line.length, rel=1e-3)
+    assert shortest_m < turn.length_m < 1.04 * shortest_m
+
+
+@pytest.mark.parametrize("radius_m", [6.0, 10.0])
+def test_a_track_is_left_early_and_joined_late_where_a_tree_is_too_near(radius_m: float) -> None:
+    turn, _, shortest_m = past_a_tree(radius_m, before_m=0.5, spare_m=0.0)
+    assert (turn.kind, turn.fits) == ("drive", False)
+    assert turn.length_m == pytest.approx(shortest_m)
+    turn, line, _ = past_a_tree(radius_m, before_m=0.5, spare_m=40.0)
+    assert (turn.kind, turn.fits) == ("dubins", True)
+    assert turn.early_m == pytest.approx(turn.late_m)
+    assert 4.0 < turn.early_m < 8.0
+    assert turn.length_m == pytest.approx(line.length, rel=1e-3)
+    assert turn.length_m < 1.4 * (2.0 * radius_m + 1.0 + turn.early_m + turn.late_m)
+    # No more of the segments is left out than there is.
+    for spare_m in (1.0, 3.0, 3.6, 4.7):
+        turn, _, _ = past_a_tree(radius_m, before_m=0.5, spare_m=spare_m)
+        assert max(turn.early_m, turn.late_m) <= spare_m
+        assert turn.fits == (turn.early_m > 0)
