@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapely
 from shapely import box
-from shapely.affinity import rotate
+from shapely.affinity import rotate, translate
 
 import geofield as gf
 from geofield.errors import TrackError
@@ -37,6 +37,56 @@ def test_a_hole_in_the_strip_cuts_the_pass_around_the_field() -> None:
     around = gf.plan_tracks(field, crs=32633, spacing_m=8, headland_m=8, direction=90)
     (whole,) = around.headland_tracks.geometry
     assert whole.difference(hole).length == pytest.approx(ring.length, abs=0.01)
+
+
+def test_both_parts_that_a_headland_leaves_have_tracks_and_passes() -> None:
+    lobes, neck = (box(0, 0, 80, 100), box(120, 0, 200, 120)), box(60, 40, 140, 48)
+    field: Any = translate(shapely.union_all([*lobes, neck]), 500_000, 5_500_000)
+    # Of this zone a metre is 0.9 units.
+    crs: Any = "+proj=tmerc +lon_0=15 +k=0.9 +x_0=500000 +datum=WGS84 +units=m"
+    tracks = gf.plan_tracks(field, crs=crs, spacing_m=5, headland_m=10, direction=0)
+    inner = [
+        box(500_009, 5_500_009, 500_071, 5_500_091),
+        box(500_129, 5_500_009, 500_191, 5_500_111),
+    ]
+    segments = tracks.segments.to_crs(crs)
+    lost = segments.geometry.difference(shapely.union_all(inner).buffer(0.01)).length
+    assert lost.max() < 0.01
+    for part in inner:
+        assert segments.intersects(part).sum() in (13, 14)  # one every 4.5 units of 62
+    rings = tracks.headland_tracks.to_crs(crs)
+    # The first pass runs through the neck, the second around each part.
+    assert rings["pass_no"].tolist() == [1, 2, 2]
+    assert rings["segment_no"].tolist() == [1, 1, 2]
+    strip_m2 = (field.area - shapely.union_all(inner).area) / 0.9**2
+    assert tracks.headland["area_ha"].tolist() == pytest.approx([strip_m2 / 1e4], rel=1e-3)
+
+
+def test_passes_run_around_holes_where_the_headland_does() -> None:
+    field = box(500_000, 5_500_000, 500_200, 5_500_100)
+    hole = box(500_090, 5_500_040, 500_110, 5_500_060)
+    holed = shapely.Polygon(field.exterior, [hole.exterior])
+    crs: Any = "+proj=tmerc +lon_0=15 +k=1 +x_0=500000 +datum=WGS84 +units=m"
+    options: Any = {"crs": crs, "spacing_m": 3, "headland_m": 6, "direction": 90}
+    tracks = gf.plan_tracks(holed, headland_holes=True, **options)
+    rings = tracks.headland_tracks
+    assert rings["pass_no"].tolist() == [1, 1, 2, 2]
+    assert rings["segment_no"].tolist() == [1, 2, 1, 2]
+    assert rings["offset_m"].tolist() == [1.5, 1.5, 4.5, 4.5]
+    around = [2 * (197 + 97), 4 * 23, 2 * (191 + 91), 4 * 29]
+    assert rings["length_m"].tolist() == pytest.approx(around, abs=0.05)
+    (strip,) = tracks.headland["area_ha"]
+    assert strip * 1e4 == pytest.approx(200 * 100 - 188 * 88 + 32 * 32 - 20 * 20, abs=0.5)
+    # Else the hole has no strip of its own.
+    alone = gf.plan_tracks(holed, **options)
+    assert alone.headland_tracks["length_m"].tolist() == pytest.approx(around[::2], abs=0.05)
+    assert alone.headland["area_ha"][0] * 1e4 == pytest.approx(200 * 100 - 188 * 88, abs=0.5)
+
+
+def test_a_headland_of_nothing_is_refused() -> None:
+    field = box(500_000, 5_500_000, 500_200, 5_500_100)
+    with pytest.raises(TrackError, match="too narrow to be one"):
+        gf.plan_tracks(field, crs=32633, spacing_m=8, headland_m=1e-7)
 
 
 def test_rings_of_a_centimetre_are_not_united() -> None:
