@@ -9,6 +9,7 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 
+import geopandas as gpd
 import pytest
 
 import geofield as gf
@@ -47,6 +48,26 @@ def test_the_svg_holds_lines_and_words(maps: Path) -> None:
     drawn = [each.get("d", "") for each in root.iter(f"{SVG}path")]
     assert len(drawn) > len(plan.tracks.segments)
     assert len(list(root.iter(f"{SVG}image"))) == 1
+
+
+def test_obstacles_have_their_numbers_and_turns_that_do_not_fit_are_told(
+    maps: Path, tmp_path: Path
+) -> None:
+    """The sheet had no number, and all turns in one colour."""
+    plan = tmp_path / "route.gpkg"
+    route = ("--route", "shortest", "--turning-radius", "6")
+    run_geofield("tracks", maps / "field.gpkg", *route, "-o", plan, check=True)
+    run_geofield("export", plan, "-f", "map-svg", "--out", tmp_path, check=True)
+    root = ET.parse(tmp_path / "map.svg").getroot()
+    words = ["".join(each.itertext()) for each in root.iter(f"{SVG}text")]
+    obstacles = gpd.read_file(plan, layer="obstacles")
+    assert {str(number) for number in obstacles["obstacle_no"]} <= set(words)
+    turns = gpd.read_file(plan, layer="turns")
+    unfit = int((turns["fits"] == "no").sum())
+    assert 1 < unfit < len(turns)
+    assert f"{unfit} turns that do not fit" in words
+    styles = [each.get("style", "") for each in root.iter(f"{SVG}path")]
+    assert sum("stroke: #ff1744" in style for style in styles) == unfit + 1  # and the legend
 
 
 @pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")

@@ -6,18 +6,21 @@ import json
 import re
 import shutil
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from axe_core_python.selenium import Axe
+from PIL import Image
 from pyproj import CRS, Transformer
 from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.support.ui import WebDriverWait
 
 import geofield as gf
+from geofield import theme
 from geofield.formats import read_dataset
 from geofield.model.map_words import figures_in_words
 from geofield.web.view import place_table
@@ -74,6 +77,11 @@ def test_the_page_opens_from_the_disk_and_asks_nobody(folder: Path, tmp_path: Pa
         assert f"{plan.field.area_ha:.2f} ha" in shown
         assert f"{len(plan.tracks.lines)} ·" in shown
         assert "Turn that does not fit" in shown
+        pixels = np.asarray(Image.open(BytesIO(driver.get_screenshot_as_png())).convert("RGB"))
+        like = np.abs(pixels[:, :880].astype(int) - theme.rgb(theme.UNFIT)).sum(axis=2) < 30
+        assert plan.tracks.turns is not None
+        assert (plan.tracks.turns["fits"] == "no").any()
+        assert like.sum() > 7000  # 11 800, and 3800 when the obstacles' lines hid them
         # What no track goes around is not counted among the obstacles.
         assert plan.obstacles is not None
         some = plan.obstacles.assign(status=["rejected"] * 5 + ["confirmed"] * 16)

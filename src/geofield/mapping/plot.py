@@ -16,6 +16,7 @@ from geofield.model.map_words import (
     credit_in_words,
     doubts_in_words,
     figures_in_words,
+    frame_lines,
     length_in_words,
     round_length_m,
 )
@@ -38,6 +39,7 @@ def plot_dataset(dataset: Dataset, scene: Scene | None = None, ax: Axes | None =
     """
     if find_spec("matplotlib") is None:
         raise GeofieldError("Drawing this needs matplotlib.", hint="pip install 'geofield[plot]'")
+    import geopandas as gpd
     from matplotlib import patheffects
     from matplotlib.lines import Line2D
 
@@ -51,32 +53,43 @@ def plot_dataset(dataset: Dataset, scene: Scene | None = None, ax: Axes | None =
         pixels, (left, bottom, right, top) = shown_pixels(scene, dataset.crs, 2000)
         ax.imshow(pixels, extent=(left, right, bottom, top), zorder=1)
     casing = [patheffects.withStroke(linewidth=3, foreground="#00000090")]
+    # With a casing they would be no text in an SVG.
+    ground = {"facecolor": "black", "alpha": 0.5, "linewidth": 0, "pad": 0.8}
+    number: Any = {"color": "white", "size": 6, "ha": "center", "va": "center", "zorder": 5}
     marks: list[Line2D] = []
 
-    def draw(layer: str, color: str, label: str, **style: object) -> None:
-        table = dataset.table(layer) if layer in dataset.tables else None
-        if table is not None and len(table):
-            table.plot(ax=ax, color=color, path_effects=casing, zorder=2, **style)
-            marks.append(Line2D([], [], color=color, label=label, path_effects=casing))
+    def draw(rows: gpd.GeoSeries, color: str, label: str, **style: Any) -> None:
+        if len(rows):
+            rows.plot(ax=ax, color=color, path_effects=casing, **{"zorder": 2, **style})
+            dash = style.get("linestyle", "-")
+            marks.append(Line2D([], [], c=color, ls=dash, label=label, path_effects=casing))
 
-    draw(schema.SEGMENTS.name, theme.TRACK, "tracks", linewidth=0.8)
-    draw(schema.HEADLAND_TRACKS.name, theme.HEADLAND, "headland tracks", linewidth=0.8)
-    draw(schema.GAPS.name, theme.GAP, "gaps", linewidth=0.8, linestyle=":")
-    draw(schema.TURNS.name, theme.TURN, "turns", linewidth=0.8)
+    def lines(layer: schema.Layer) -> gpd.GeoSeries:
+        return dataset.table(layer.name).geometry
+
+    draw(lines(schema.SEGMENTS), theme.TRACK, "tracks", linewidth=0.8)
+    draw(lines(schema.HEADLAND_TRACKS), theme.HEADLAND, "headland tracks", linewidth=0.8)
+    draw(lines(schema.GAPS), theme.GAP, "gaps", linewidth=0.8, linestyle=":")
+    turns, fits = lines(schema.TURNS), dataset.table(schema.TURNS.name)["fits"]
+    draw(turns[fits != "no"], theme.TURN, "turns", linewidth=0.8)
+    # Wider than an obstacle's line: ways around obstacles lie on it.
+    unfit = turns[fits == "no"]
+    label = counted(len(unfit), "turn that does not fit", "turns that do not fit")
+    draw(unfit, theme.UNFIT, label, linewidth=4)
     field = dataset.table(schema.FIELD.name)
     doubts = field["doubts"].iloc[0] if "doubts" in field else None
-    color, label = (theme.DOUBT, "outline in doubt") if doubts else (theme.OUTLINE, "outline")
-    field.boundary.plot(ax=ax, color=color, linewidth=2, path_effects=casing, zorder=3)
-    marks.append(Line2D([], [], color=color, linewidth=2, label=label, path_effects=casing))
+    line = (theme.DOUBT, "outline in doubt") if doubts else (theme.OUTLINE, "outline")
+    draw(field.boundary, *line, linewidth=2, zorder=3)
+    beyond = gpd.GeoSeries(frame_lines(dataset), crs=dataset.crs)
+    draw(beyond, "black", "goes on outside", linewidth=2, zorder=3, linestyle="--")
     obstacles = dataset.table(schema.OBSTACLES.name)
     for status, look in theme.STATUS.items():
         rows = obstacles[obstacles["status"] == status]
-        if len(rows):
-            dash: Any = (0, look.dash) if look.dash else "-"
-            style = {"linestyle": dash, "linewidth": 1.4, "path_effects": casing, "zorder": 4}
-            rows.boundary.plot(ax=ax, color=look.color, **style)
-            text = f"{counted(len(rows), 'obstacle')}, {status}"
-            marks.append(Line2D([], [], color=look.color, linestyle=dash, label=text))
+        text = f"{counted(len(rows), 'obstacle')}, {status}"
+        style = {"linestyle": (0, look.dash) if look.dash else "-", "linewidth": 1.4, "zorder": 4}
+        draw(rows.boundary, look.color, text, **style)
+        for no, place in zip(rows["obstacle_no"], rows.representative_point(), strict=True):
+            ax.text(place.x, place.y, no, clip_on=True, bbox=ground, **number)
     ax.set_aspect("equal")
     # A name is no formula, whatever signs it has.
     ax.set_title(dataset.name, parse_math=False)

@@ -37,7 +37,7 @@ export function trackStyle(feature, resolution) {
 }
 
 export const turnStyle = feature => feature.get("fits")
-  ? once("turn", () => cased(theme.turn, 1.4)) : once("unfit", () => cased(theme.unfit, 3));
+  ? once("turn", () => cased(theme.turn, 1.4)) : once("unfit", () => cased(theme.unfit, 8));
 
 // Which way a segment is driven, and as which of all: an arrow at its middle.
 export function driveStyle(feature, resolution) {
