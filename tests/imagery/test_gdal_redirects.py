@@ -5,8 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.error import HTTPError
+from urllib.request import ProxyHandler, build_opener
 
 import pytest
+import rasterio
+
+from geofield.errors import ImageryError
+from geofield.imagery.gateway import gateway
+from geofield.imagery.gdal import open_picture
+from geofield.imagery.reach import Reach
 
 from .test_reach import Stranger, cut, folder, refused, stranger, vrt  # noqa: F401  (fixtures)
 from .tile_server import Handler, TileServer, serving
@@ -94,3 +102,25 @@ def test_a_server_that_does_not_answer_is_named_at_once(
     assert f"a.tif cannot be read: {host} does not answer (" in told
     assert "Check the address and the network." in told
     assert time.monotonic() - begun < 13
+
+
+def test_no_picture_is_said_to_come_from_a_server_of_another(
+    server: TileServer,
+) -> None:
+    """While one server says "not found", another is asked for in vain, as by a second thread."""
+    silent, missing = "http://127.0.0.1:9/b.tif", f"{server.address}/a.tif"
+
+    def answer(handler: Handler, _: dict[str, str]) -> None:
+        proxy = gateway().options(Reach((silent,)))["GDAL_HTTP_PROXY"]
+        opener = build_opener(ProxyHandler({"http": proxy}))
+        with pytest.raises(HTTPError):
+            opener.open(silent)
+        handler.reply(404, b"", "text/plain")
+
+    server.routes["/"] = answer
+    told = r"b\.tif cannot be read: 127\.0\.0\.1 does not answer"
+    with rasterio.Env():
+        with pytest.raises(ImageryError, match=r"a\.tif cannot be opened: .*404"):
+            open_picture(missing)
+        with pytest.raises(ImageryError, match=told):
+            open_picture(silent)

@@ -38,8 +38,8 @@ class Gateway(ThreadingHTTPServer):
         super().__init__(("127.0.0.1", 0), _Handler)
         #: Addresses out of reach that were asked for.
         self.refused: list[str] = []
-        #: Why the last host that did not answer did not.
-        self.silent = ""
+        #: Why servers that do not answer do not.
+        self._silent: dict[str, str] = {}
         self._answered: set[str] = set()
         self._reaches: set[Reach] = set()
         self._proxies = getproxies()
@@ -56,20 +56,33 @@ class Gateway(ThreadingHTTPServer):
 
     def may(self, address: str) -> bool:
         """Whether an address is within reach; one that is not is remembered."""
-        if any(reach.holds(address) for reach in self._reaches):
+        if any(reach.holds(address) for reach in list(self._reaches)):
             return True
         self.refused.append(address)
         return False
 
-    def connected(self, scheme: str, host: str, port: int) -> http.client.HTTPConnection:
-        """A connection to a host, through the user's own proxy where there is one.
+    def silent(self, path: str) -> str:
+        """Why a server that a picture may come from does not answer; told once.
+
+        Others read other pictures at the same time.
+        """
+        reaches = [each for each in list(self._reaches) if each.allowed[-1] == path]
+        for server in list(self._silent):
+            if any(reach.holds(server) for reach in reaches):
+                return self._silent.pop(server, "")
+        return ""
+
+    def connected(self, server: str) -> http.client.HTTPConnection:
+        """A connection to a server, through the user's own proxy where there is one.
 
         Raises
         ------
         OSError
             Where there is no way to it.
         """
-        proxy = self._proxies.get(scheme)
+        asked = urlsplit(server)
+        host, port = asked.hostname or "", asked.port or 80
+        proxy = self._proxies.get(asked.scheme)
         if not proxy or proxy_bypass(host):
             through = http.client.HTTPConnection(host, port, timeout=_CONNECT_S)
         else:
@@ -80,15 +93,15 @@ class Gateway(ThreadingHTTPServer):
             through.set_tunnel(host, port)
         through.connect()
         through.sock.settimeout(_TIMEOUT_S)
-        self._answered.add(host)
-        self.silent = ""
+        self._answered.add(server)
+        self._silent.pop(server, None)
         return through
 
-    def without(self, host: str, error: Exception) -> int:
+    def without(self, server: str, error: Exception) -> int:
         """The status for a host that is silent: GDAL asks again only where it has answered."""
         words = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        self.silent = f"{host} does not answer ({words.lower()})"
-        return 502 if host in self._answered else 403
+        self._silent[server] = f"{urlsplit(server).hostname} does not answer ({words.lower()})"
+        return 502 if server in self._answered else 403
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """GDAL closes connections as it likes."""
@@ -109,15 +122,14 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_CONNECT(self) -> None:
         """A tunnel: what is in it is between GDAL and the host."""
-        host, _, port = self.path.rpartition(":")
-        host = host.strip("[]")
-        if not self.server.may(f"https://{self.path}"):
+        server = f"https://{self.path}"  # it names the port
+        if not self.server.may(server):
             self._refuse()
             return
         try:
-            connection = self.server.connected("https", host, int(port))
+            connection = self.server.connected(server)
         except OSError as error:
-            self.send_error(self.server.without(host, error))
+            self.send_error(self.server.without(server, error))
             return
         self.send_response(200)
         self.end_headers()
@@ -135,12 +147,13 @@ class _Handler(BaseHTTPRequestHandler):
             return
         headers = {name: value for name, value in self.headers.items() if name.lower() not in _HOP}
         path = parts._replace(scheme="", netloc="").geturl() or "/"
+        server = f"http://{parts.netloc}"
         try:
-            connection = self.server.connected("http", parts.hostname, parts.port or 80)
+            connection = self.server.connected(server)
             connection.request(self.command, path, headers=headers)
             answer = connection.getresponse()
         except (OSError, http.client.HTTPException) as error:
-            self.send_error(self.server.without(parts.hostname, error))
+            self.send_error(self.server.without(server, error))
             return
         self.send_response_only(answer.status, answer.reason)
         for name, value in answer.getheaders():

@@ -157,8 +157,7 @@ def _tell_refused(path: str, reach: Reach = OWN_FOLDER) -> None:
         return
     from geofield.imagery.gateway import gateway
 
-    refused, silent = gateway().refused, gateway().silent
-    gateway().silent = ""
+    refused, silent = gateway().refused, gateway().silent(path)
     if refused:
         address = refused.pop()
         refused.clear()
