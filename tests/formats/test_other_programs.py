@@ -52,7 +52,7 @@ def test_it_is_read_in_an_archive_and_in_a_folder_too(tmp_path, name):
     if name == "a.gml":
         shutil.copy(tmp_path / "in" / name, tmp_path / "in" / "b.gml")
         done = geofield("import", tmp_path / "in", "-o", tmp_path / "two.gpkg")
-        assert "holds 2 vector files.\nName one of them." in done.stderr
+        assert "holds 2 files (vector file of another program).\nName one of them." in done.stderr
 
 
 def test_a_boundary_of_another_format_around_trees_of_a_usual_one(tmp_path):

@@ -40,7 +40,6 @@ OTHER = Format(
     "",
     "geofield.formats.foreign:read_layers",
     asks_crs=True,
-    reads_folders=True,
 )
 #: What a file is called that some format reads.
 _READ = {suffix for each in CATALOGUE if each.reader for suffix in each.suffixes}
@@ -139,19 +138,19 @@ def product_files(place: Path, found: Format) -> list[Path]:
     FormatError
         When the folder holds several.
     """
-    if not place.is_dir() or (found.reads_folders and found is not OTHER):
+    if not place.is_dir() or found.reads_folders:
         return [place]
     files = files_of(place, found)
     if len(products(files)) != 1:
-        kind = "vector" if found is OTHER else found.title
-        raise FormatError(f"{place} holds {len(files)} {kind} files.", hint="Name one of them.")
+        told = f"{place} holds {len(files)} files ({found.title})."
+        raise FormatError(told, hint="Name one of them.")
     return files
 
 
 def files_of(folder: Path, found: Format) -> list[Path]:
     """The files of a folder that a format reads; a file geodatabase is one itself."""
     inside = sorted(folder.iterdir())
-    if found is not OTHER:
+    if found.suffixes:
         return [file for file in inside if file.suffix.lower() in found.suffixes]
     if _has_shapes(folder):
         return [folder]
