@@ -294,7 +294,7 @@ def test_distances_are_those_on_the_ground():
         assert result.pooled.distance == pytest.approx(5, abs=0.02)
 
 
-@pytest.mark.parametrize("wrong", ["no shapes", "radius in words", "no folder"])
+@pytest.mark.parametrize("wrong", ["no shapes", "radius in words", "no folder", "no degrees"])
 def test_the_command_says_what_is_wrong(tmp_path, capsys, wrong):
     import pandas as pd
     import pyogrio
@@ -308,6 +308,9 @@ def test_the_command_says_what_is_wrong(tmp_path, capsys, wrong):
     elif wrong == "radius in words":
         found.assign(radius_m="3 m").to_file(file, layer="obstacles")
         words = "holds words, as '3 m'"
+    elif wrong == "no degrees":  # ended in a traceback of geopandas
+        found.set_crs(4326, allow_override=True).to_file(file, layer="obstacles")
+        words = "is not a place on earth"
     else:
         found.to_file(file, layer="obstacles")
         arguments, words = ["--draw", str(tmp_path / "none" / "hits.png")], "hits.png"

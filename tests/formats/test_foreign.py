@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import warnings
 
 import geopandas as gpd
@@ -9,10 +10,12 @@ import pytest
 import shapely
 from pyproj import CRS
 
-from geofield.errors import FormatError, FormatWarning
+from geofield.cli.parcels import parcel_and_point
+from geofield.errors import CRSError, FormatError, FormatWarning
 from geofield.formats import FORMATS, read_dataset, write_dataset
 from geofield.formats.foreign_tables import obstacle_table
 from geofield.formats.importing import merged
+from geofield_command import run_geofield
 
 UTM = "EPSG:32633"
 BOX = shapely.box(500_000, 5_500_000, 500_200, 5_500_100)
@@ -72,6 +75,44 @@ def test_without_prj_degrees_are_told_and_metres_refused(tmp_path):
     with pytest.raises(FormatError, match="metres or feet of any projection"):
         read_dataset(metres)
     assert read_dataset(metres, crs=UTM).table("field").area.iloc[0] == pytest.approx(20_000)
+
+
+def test_geojson_of_metres_is_in_the_crs_that_is_named(tmp_path):
+    """Many farm programs write it: it was "in WGS 84 by its own word", whatever was named."""
+    row = {"type": "Feature", "properties": {}, "geometry": shapely.geometry.mapping(BOX)}
+    path = tmp_path / "metres.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [row]}))
+    for words in (
+        ("import", path, "--crs", UTM, "-o", tmp_path / "a.gpkg"),
+        ("tracks", path, "--crs", UTM, "--spacing", 5, "-o", tmp_path / "b.gpkg"),
+    ):
+        run_geofield(*words, check=True)
+        field = gpd.read_file(words[-1], layer="field")
+        assert field.geometry[0].equals(BOX)
+        assert field.crs == CRS(UTM)
+    with pytest.raises(FormatError, match="does not say its CRS"):
+        read_dataset(path)
+    with pytest.raises(CRSError, match=r"no coordinate reference system(.|\n)*ogr2ogr -a_srs"):
+        parcel_and_point(path, None, None, None, None)
+    # What the file says stands.
+    said = {"crs": {"type": "name", "properties": {"name": "EPSG:4326"}}}
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": [row], **said}))
+    with pytest.raises(FormatError, match="by its own word"):
+        read_dataset(path, crs=UTM)
+
+
+def test_closed_lines_without_an_outline_are_told(tmp_path):
+    """`--boundary` took such a line for the field, import for a track, without a word."""
+    path = write(tmp_path / "ring.shp", [shapely.LineString(BOX.exterior.coords)])
+    dataset = read_dataset(path)
+    assert dataset.has("tracks")
+    assert dataset.notes[-1] == (
+        "no field in 1 line that ends where it begins: `geofield field --boundary` makes one of "
+        "such a line"
+    )
+    assert parcel_and_point(path, None, None, None, None)[0].polygon.equals(BOX)
+    inner = write(tmp_path / "both.gpkg", [BOX, shapely.LineString(BOX.buffer(-5).exterior.coords)])
+    assert not any("no field" in note for note in read_dataset(inner).notes)
 
 
 def test_a_wrong_crs_is_not_believed(tmp_path):

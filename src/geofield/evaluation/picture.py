@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import NDArray
 
 from geofield import schema
-from geofield.crs import is_utm, utm_crs
+from geofield.crs import LONLAT, is_utm, refuse_outside, transformer, utm_crs
 from geofield.errors import CRSError, ObstacleError
 from geofield.evaluation.compare import Evaluation, compared
 from geofield.finite import refuse_nowhere
@@ -70,7 +70,7 @@ def placed(frame: gpd.GeoDataFrame, name: str, *, metric: bool = False) -> gpd.G
     Raises
     ------
     CRSError
-        When it has no CRS.
+        When it has no CRS, or lies outside it.
     """
     refuse_nowhere(frame.geometry.to_numpy(), name)
     if frame.crs is None:
@@ -79,7 +79,11 @@ def placed(frame: gpd.GeoDataFrame, name: str, *, metric: bool = False) -> gpd.G
         )
     if metric and not is_utm(frame.crs):
         lies = np.isfinite(frame.total_bounds).all()  # else any zone will do
-        frame = frame.to_crs(frame.estimate_utm_crs() if lies else utm_crs(0.0, 0.0))
+        west, south, east, north = frame.total_bounds if lies else (0.0, 0.0, 0.0, 0.0)
+        middle = (west + east) / 2, (south + north) / 2
+        lon, lat = transformer(frame.crs, LONLAT).transform(*middle)
+        refuse_outside(frame.crs, lon, lat, what=f"Coordinates of {name}")
+        frame = frame.to_crs(utm_crs(lon, lat))
     return frame
 
 

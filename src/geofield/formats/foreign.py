@@ -26,6 +26,7 @@ from geofield.finite import refuse_nowhere
 from geofield.formats.antimeridian import joined, unwrapped
 from geofield.formats.catalogue import PARQUET
 from geofield.formats.registry import refuse_no_rows
+from geofield.formats.row_crs import said_crs
 from geofield.formats.sorting import RawLayer, sort_out
 from geofield.model import Dataset
 from geofield.notes import warn
@@ -84,6 +85,8 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
             f"{path}: {layer or path.stem!r} is a table without geometry.",
             hint="Name a layer with shapes; positions are read from CSV with columns lat and lon.",
         )
+    if frame.crs is not None:
+        frame = frame.set_crs(said_crs(path, layer, frame.crs), allow_override=True)
     return _as_filled(_exact(frame, path, layer), path)
 
 

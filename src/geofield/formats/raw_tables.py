@@ -20,7 +20,7 @@ from geofield.formats.catalogue import PARQUET
 from geofield.formats.foreign import refuse_layer
 from geofield.formats.gpkg_read import is_own
 from geofield.formats.registry import detect, files_of, refuse_no_rows
-from geofield.formats.row_crs import refuse_other_rows
+from geofield.formats.row_crs import refuse_other_rows, said_crs
 from geofield.formats.zipped import unpacked
 from geofield.strangers import check_vector, unreadable
 from geofield.wording import command, nearest
@@ -248,10 +248,11 @@ def _vector(path: Path, layer: str | None) -> RawTable:
     table = table.replace_schema_metadata(None)
     if name not in table.column_names:
         return RawTable(path.name, table)
+    crs = said_crs(path, layer, meta["crs"])
     geometry = table[name].combine_chunks()
     if _is_curved(geometry):  # only here GDAL makes lines of arcs
         geometry = pa.array(pyogrio.raw.read(path, layer=layer, columns=[])[2], pa.binary())
-    return RawTable(path.name, table.drop_columns(name), geometry, name, meta["crs"])
+    return RawTable(path.name, table.drop_columns(name), geometry, name, crs)
 
 
 def _is_curved(geometry: pa.Array) -> bool:

@@ -1,4 +1,4 @@
-"""Rows that say another CRS than their file: readers pass over that word, and misplace them."""
+"""What files say of their CRS that readers pass over: rows in another one, GeoJSON of metres."""
 
 from __future__ import annotations
 
@@ -13,7 +13,25 @@ from geofield.crs import parse_crs
 from geofield.errors import CRSError
 from geofield.strangers import database
 
+_GEOJSON = (".geojson", ".json")
+#: No longitude is beyond it, also where they go on across 180 degrees.
+_ROUND_DEG = 360.0
 _HINT = "One file has one CRS: ogr2ogr -t_srs EPSG:4326 {} FILE, for each part by itself."
+
+
+def said_crs(path: Path, layer: str | None, crs: Any) -> Any:
+    """The CRS that a file says, which is `crs` to GDAL.
+
+    A GeoJSON file without a word of it is in degrees by its standard alone: of numbers that are no
+    degrees it says none.
+    """
+    if path.suffix.lower() not in _GEOJSON or not path.is_file():
+        return crs
+    import pyogrio
+
+    bounds = pyogrio.read_info(path, layer=layer, force_total_bounds=True)["total_bounds"]
+    beyond = bounds is not None and max(map(abs, bounds)) > _ROUND_DEG
+    return None if beyond and b'"crs"' not in path.read_bytes() else crs
 
 
 def refuse_other_rows(path: Path, layer: str | None, crs: Any) -> None:
@@ -27,7 +45,7 @@ def refuse_other_rows(path: Path, layer: str | None, crs: Any) -> None:
     """
     suffix = path.suffix.lower()
     found: tuple[int, str] | None = None
-    if suffix in (".geojson", ".json") and path.is_file():
+    if suffix in _GEOJSON and path.is_file():
         found = next(_geojson(path, crs), None)
     elif suffix == ".gpkg":
         found = _geopackage(path, layer)

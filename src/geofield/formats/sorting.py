@@ -147,6 +147,9 @@ def sort_out(
     lines = _with_length(_without_asides(lines, tables, notes), notes)
     taken = "left out, beside the plan's own tracks" if "tracks" in tables else "taken as guidance"
     notes += [part.told(len(part.frame), taken) for part in lines]
+    if (rings := sum(int(part.frame.is_ring.sum()) for part in lines)) and "field" not in tables:
+        each = counted(rings, "line that ends where it begins", "lines that end where they begin")
+        notes.append(f"no field in {each}: `geofield field --boundary` makes one of such a line")
     if lines and "tracks" not in tables:
         drawn = _joined([part.frame for part in lines])
         tables["tracks"], tables["segments"] = line_tables(drawn, metric, extras=True)
