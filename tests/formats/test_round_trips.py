@@ -7,9 +7,11 @@ import json
 import re
 import shutil
 import tempfile
+import xml.etree.ElementTree as ET
 import zipfile
 from pathlib import Path
 
+import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
@@ -61,6 +63,40 @@ def test_what_no_longer_knows_its_trees_is_told(dataset, tmp_path, name):
     trees = (read_dataset(tmp_path / name).table("obstacles")["kind"] == "tree").any()
     assert (dataset.table("obstacles")["kind"] == "tree").any()
     assert trees != ("which obstacles are trees" in dropped(dataset, FORMATS[name]))
+
+
+def test_study_xml_tells_what_it_leaves_out(dataset, tmp_path):
+    """It had no rejected obstacle and no status, without a word."""
+    write_dataset(dataset, tmp_path, ["study-xml"])
+    root = ET.parse(tmp_path / "obstacles.xml").getroot()
+    numbers = {int(each.text) for each in root.iter("Number")}
+    assert numbers == set(dataset.table("obstacles")["obstacle_no"]) - {3}
+    told = dropped(dataset, FORMATS["study-xml"])
+    assert "obstacles that tracks run through" in told
+    assert "the status, safety margin and confidence of obstacles" in told
+
+
+def test_fiboa_keeps_the_name_and_what_speaks_against_the_outline(dataset, tmp_path):
+    field = dataset.table("field").assign(certainty=[0.41], doubts=["the border is faint"])
+    doubtful = dataclasses.replace(dataset, tables={**dataset.tables, "field": field})
+    write_dataset(doubtful, tmp_path, ["fiboa"])
+    for file in ("field.geojson", "field.parquet"):
+        path = tmp_path / "fiboa" / file
+        row = (gpd.read_parquet if file.endswith("parquet") else gpd.read_file)(path).iloc[0]
+        assert (row["name"], row["certainty"], row["doubts"]) == (NAME, 0.41, "the border is faint")
+
+
+def test_the_studys_points_come_back_as_exactly_as_is_said(dataset, tmp_path):
+    """Said to be exact, and 7 mm off: the study writes seven decimals of a degree."""
+    write_dataset(dataset, tmp_path, ["rdf-study"])
+    back = read_dataset(tmp_path / "tracks.rdf").table("track_points")
+    assert_same_table(
+        dataset.table("track_points"),
+        back,
+        precision_m=FORMATS["rdf-study"].precision_m,
+        columns=["point_no", "track_no", "segment_no"],
+    )
+    assert FORMATS["rdf-study"].precision_m < 0.01
 
 
 @pytest.mark.parametrize("name", ["isoxml", "isoxml-v3"])

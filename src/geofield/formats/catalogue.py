@@ -264,6 +264,7 @@ CATALOGUE: tuple[Format, ...] = (
         title="RDF/XML in the source study's vocabulary",
         writer="geofield.formats.rdf.write:write_study",
         suffixes=(),
+        precision_m=0.008,
         options=("base_iri", "plan_name", "points"),
     ),
     Format(
@@ -275,8 +276,9 @@ CATALOGUE: tuple[Format, ...] = (
         drops=(
             _OWN,
             _ORIGIN,
+            _PASSED,
             Drop("the outlines of obstacles that are not round", "polygons"),
-            Drop("the confidence of obstacles", "obstacles.confidence"),
+            Drop("the status, safety margin and confidence of obstacles", "obstacles"),
         ),
     ),
     _shown(

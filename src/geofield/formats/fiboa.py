@@ -27,6 +27,8 @@ SCHEMAS = (
     "https://fiboa.org/specification/v0.3.0/schema.yaml",
 )
 COLLECTION = "geofield"
+#: What people call a field, and what speaks against its outline.
+_MORE = ("name", "certainty", "doubts")
 #: How the outline came to be, in fiboa's words.
 _DRAWN = {"drawn": "manual", "boundary": "unknown", "given": "unknown"}
 #: Degrees: a centimetre, RFC 7946's advice and a half.
@@ -69,6 +71,9 @@ def _properties(row: Mapping[str, Any], shape: Any, dataset: Dataset) -> dict[st
     }
     if not pd.isna(date):
         properties["determination:datetime"] = f"{str(date)[:10]}T00:00:00Z"
+    # fiboa knows no such thing, and lets files have more than it knows.
+    more = {name: _plain(row.get(name)) for name in _MORE}
+    properties |= {name: value for name, value in more.items() if value is not None}
     # A user's column of the same name takes no word of fiboa's another meaning.
     known = {*properties, "determination:datetime", "geometry", "bbox", "schemas"}
     for name in schema.own_columns(schema.FIELD, dataset.table(schema.FIELD.name)):
