@@ -692,6 +692,25 @@ def test_exports_show_the_picture_and_do_not_replace_those_of_another_plan(
     assert (folder / "export" / "field" / "shapefile" / "guidance.shp").exists()
 
 
+def test_what_the_page_exports_is_what_the_command_does(plan_path: Path) -> None:
+    """Linked data had another IRI of the dataset, the report no picture."""
+    desk = Desk(plan_path)
+    desk.edit({"do": "status", "no": 3, "status": "rejected"})
+    desk.edit({"do": "move", "no": 7, "dx_m": 4.0, "dy_m": -2.5})
+    desk.save()
+    names = ["ntriples", "report", "map-svg", "dxf", "agopengps", "study-xml", "shapefile"]
+    for name in names:
+        desk.export(name)
+    desk.end()
+    out = plan_path.parent / "command"
+    run_geofield("export", plan_path, "-f", ",".join(names), "--out", out, check=True)
+    files = [file for file in sorted(out.rglob("*")) if file.is_file()]
+    assert len(files) > 20
+    for file in files:
+        own = plan_path.parent / "export" / "field" / file.relative_to(out)
+        assert own.read_bytes() == file.read_bytes(), file
+
+
 def test_an_export_does_not_replace_another_whose_files_are_called_alike(plan_path: Path) -> None:
     plain, study = "export/field/obstacles.rdf", "export/field/rdf-study"
     folder, desk = plan_path.parent, Desk(plan_path)

@@ -257,12 +257,11 @@ class Desk:
             listening() as heard,
         ):
             dataset = self.session.whole().plan.to_dataset()
-            if self._picture_path is not None and chosen.pictured:
-                scene = picture_beside(self.path)
-                if scene != self._picture_path:
-                    cut = self._scene_of(self.session.plan)
-                    scene = write_scene(cut, Path(place) / "scene.tif")
-                dataset = replace(dataset, scene_path=scene)
+            scene = picture_beside(self.path)
+            if chosen.pictured and self._picture_path not in (None, scene):
+                cut = self._scene_of(self.session.plan)
+                scene = write_scene(cut, Path(place) / "scene.tif")
+            dataset = replace(dataset, scene_path=scene)
             written = write_dataset(
                 dataset, folder, [name], stem=stem, overwrite=True, inputs=[self.path]
             )
