@@ -27,6 +27,7 @@ from geofield.review.live import LivePlans
 from geofield.review.shown import field_of
 from geofield.settings import load_settings
 from geofield.simulate import SimulatedField
+from geofield.wording import counted
 from geofield_command import run_geofield
 
 OUTSIDE = "outside the picture"
@@ -62,7 +63,7 @@ def test_the_terminal_and_the_report_tell(out: tuple[Path, str]) -> None:
     assert unworked_m > 1
     assert report["tracks"]["unworked_at_turns_m"] == pytest.approx(unworked_m, abs=0.1)
     assert f"{unworked_m:.0f} m of track left unworked at them" in told
-    assert f"{unfit} of them do not fit" in told
+    assert f"{counted(unfit, 'turn does', 'turns do')} not fit" in told
 
 
 def test_files_carry_it(out: tuple[Path, str]) -> None:

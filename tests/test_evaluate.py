@@ -167,7 +167,11 @@ def test_false_ones_that_are_no_trees_are_told(tmp_path, capsys):
     truth.to_file(tmp_path / "truth.gpkg")
     with pytest.raises(SystemExit, match="0"):
         main(["evaluate", str(tmp_path / "found.gpkg"), str(tmp_path / "truth.gpkg")])
-    assert "1 of 2 false ones are of kind other" in capsys.readouterr().err
+    assert "1 of 2 false ones of kind other" in capsys.readouterr().err
+    found.iloc[[0, 2]].to_file(tmp_path / "one.gpkg", layer="obstacles")
+    with pytest.raises(SystemExit, match="0"):
+        main(["evaluate", str(tmp_path / "one.gpkg"), str(tmp_path / "truth.gpkg")])
+    assert "1 of 1 false one of kind other" in capsys.readouterr().err
 
 
 def test_a_reviewed_plan_is_a_truth(tmp_path, capsys):

@@ -118,7 +118,10 @@ def test_the_command_tells_of_trees_without_room_and_of_a_bad_seed(
     with pytest.raises(SystemExit, match="0"):
         main(["simulate", "--size", "64", "--trees", "40", "--out", str(tmp_path / "sim")])
     said = capsys.readouterr().err
-    assert "Not all 40 trees have room" in said
+    assert "Not every field has room for 40 trees" in said
+    with pytest.raises(SystemExit, match="0"):
+        main(["simulate", "--fields", "1", "--trees", "1", "--out", str(tmp_path / "one")])
+    assert "Wrote 1 field with 1 tree to" in capsys.readouterr().err
     with pytest.raises(SystemExit, match="2"):
         main(["simulate", "--seed", "-1", "--out", str(tmp_path / "none")])
     with pytest.raises(SettingsError, match="below zero"):

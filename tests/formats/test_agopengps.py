@@ -123,7 +123,7 @@ def test_wrong_headings_are_found(folder, tmp_path):
     east, north, heading = content[10].split(",")
     content[10] = f"{east},{north},{float(heading) + 0.5:.5f}"
     (broken / "Boundary.txt").write_bytes("\r\n".join(content).encode())
-    assert any("1 headings do not fit" in each.message for each in validate_file(broken))
+    assert any("1 heading does not fit" in each.message for each in validate_file(broken))
     for damaged in (content[:30], [*content[:12], "100", *content[13:]], content[:10]):
         (broken / "Boundary.txt").write_bytes("\r\n".join(damaged).encode())
         with pytest.raises(FormatError, match="ring 1"):

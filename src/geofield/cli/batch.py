@@ -180,7 +180,7 @@ def batch(
     tell_unreached(job, outlines_in(store))
     if count.done < count.total:
         raise GeofieldError(
-            f"Stopped: {count.done} of {count.total} places are done.",
+            f"Stopped: {count.done} of {counted(count.total, 'place is', 'places are')} done.",
             hint="The same command does what is missing.",
         )
     if count.failed == count.total:
@@ -337,7 +337,7 @@ def _engine(workers: int | None, scheduler: str | None, store: Store) -> Engine:
 def _show(progress: Any, count: Count) -> None:
     """How far the run is: fields per minute, failed, time left."""
     left = count.left_s
-    words = f"{count.per_minute:.0f} fields per minute, {count.failed} failed"
+    words = f"{counted(round(count.per_minute), 'field')} per minute, {count.failed} failed"
     if left is not None and count.done < count.total:
         words += f", {_span(left)} left"
     progress(

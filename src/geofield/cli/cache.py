@@ -70,7 +70,7 @@ def info(cache_dir: Path | None, as_json: bool, settings: Settings) -> None:
         zooms = f"zoom {row['zooms'][0]} to {row['zooms'][1]}, " if row["zooms"] else ""
         days = f"{row['oldest']} to {row['newest']}" if row["oldest"] else ""
         click.secho(row["source"], bold=True, nl=False)
-        click.echo(f"  {row['tiles']} tiles, {row['megabytes']:.1f} MB, {zooms}{days}")
+        click.echo(f"  {counted(row['tiles'], 'tile')}, {row['megabytes']:.1f} MB, {zooms}{days}")
         click.echo(f"    {row['path']}")
 
 

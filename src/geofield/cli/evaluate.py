@@ -146,8 +146,8 @@ def _tell(result: Evaluation) -> None:
     others = result.false_kinds.get("other", 0)
     if others:
         say(
-            f"  {others} of {score.detected - score.hits} false ones are of kind other: "
-            "they are wrong only if TRUTH holds more than trees"
+            f"  {others} of {counted(score.detected - score.hits, 'false one')} of kind other: "
+            "wrong only if TRUTH holds more than trees"
         )
     for name in ("precision", "recall", "f1", "radius_bias"):
         low, high = score.interval.get(name, (float("nan"), float("nan")))
@@ -160,7 +160,7 @@ def _tell(result: Evaluation) -> None:
     lost = result.driving
     if lost is not None:
         say(
-            f"{lost.driven_through} of {lost.things} true obstacles are driven through, "
+            f"{lost.driven_through} of {counted(lost.things, 'true obstacle')} driven through, "
             f"{lost.driven_through_m:.0f} of {lost.driven_m:.0f} m of track"
         )
         say(f"  ground lost      {lost.share_lost:6.1%}  ({lost.lost_m2:.0f} square metres)")

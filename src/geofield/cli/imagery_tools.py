@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from geofield.cli.console import say
 from geofield.errors import ImageryError
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     from geofield.imagery import Acquired, FetchOptions, Imagery, PlacePicture, Where
@@ -180,7 +181,7 @@ def describe(done: Acquired) -> None:
             met = ", ".join(f"{count} x {what}" for what, count in report.troubles.most_common())
             say(f"           faults met and survived: {met}")
         if report.absent:
-            absent = f"{report.absent} could not be had and are no-data in the picture"
+            absent = f"{counted(report.absent, 'tile')} could not be had: no-data in the picture"
             say(f"           {absent}", fg="yellow")
     terms = "; ".join(part for part in (done.source.attribution, done.source.licence) if part)
     say(f"Source     {done.source.name}" + (f" ({terms})" if terms else ""))

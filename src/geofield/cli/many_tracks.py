@@ -161,7 +161,7 @@ def _each(places: Places, job: Job, wanted: Wanted) -> Told:
 
     if wanted.output.suffix:
         raise TrackError(
-            f"{wanted.output} is one file, and --each writes one for each of {len(places)} fields.",
+            f"{wanted.output} is one file, and --each writes one for each field.",
             hint="Give a folder: --each -o plans/",
         )
     rows, failed, taken, outlines = [], {}, set[str](), []

@@ -182,8 +182,9 @@ def _say_turns(turns: Any) -> None:
     left = f", {unworked_m:.0f} m of track left unworked at them" if unworked_m >= 0.5 else ""
     say(f"Turns      {len(turns)}{left}")
     if unfit:
+        do = counted(unfit, "turn does", "turns do")
         say(
-            f"           {unfit} of them do not fit: the machine cannot drive them there (red on "
-            "the map; a smaller turning radius, a margin or a headland helps)",
+            f"           {do} not fit: the machine cannot drive there "
+            "(red on the map; a smaller turning radius, a margin or a headland helps)",
             fg="yellow",
         )

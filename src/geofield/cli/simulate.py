@@ -109,13 +109,13 @@ def simulate(
         pd.DataFrame(rows).to_csv(folder / "seeds.csv", index=False, lineterminator="\r\n")
     wanted, least = asked["obstacles"], min(row["obstacles"] for row in rows)
     if wanted is not None and least < wanted:
-        say_note(f"Not all {wanted} trees have room in every field: one has {least}.")
+        say_note(f"Not every field has room for {counted(wanted, 'tree')}: one has {least}.")
     if as_json:
         echo_json(rows)
         return
     trees = sum(row["obstacles"] for row in rows)
     wrote = counted(fields, "field")
-    say(f"Wrote {wrote} with {trees} trees to {out}/; points are in seeds.csv.")
+    say(f"Wrote {wrote} with {counted(trees, 'tree')} to {out}/; points are in seeds.csv.")
 
 
 def _write(one: SimulatedField, folder: Path, name: str) -> dict[str, Any]:

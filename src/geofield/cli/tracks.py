@@ -38,6 +38,7 @@ from geofield.cli.options import (
 from geofield.cli.refresh import say_outdated
 from geofield.cli.standing import obstacles_for, tell_obstacles, tell_unreached
 from geofield.errors import FieldWarning, TrackError
+from geofield.wording import counted
 
 if TYPE_CHECKING:
     from geofield.farm.places import Place
@@ -146,7 +147,7 @@ def tracks(
         for one, reason in failed.items():
             say(f"{one}: {reason}")
         raise TrackError(
-            f"{len(failed)} of {len(places or ())} fields could not be planned: "
+            f"{len(failed)} of {counted(len(places or ()), 'field')} could not be planned: "
             f"{', '.join(list(failed)[:5])}{', ...' if len(failed) > 5 else ''}.",
             hint="The reasons are above; all other fields were written.",
         )

@@ -164,7 +164,8 @@ def _shapes(raw: RawTable, geometry: pa.Array, source: CRS, notes: list[str]) ->
         wkb[~area] = None
         outlines.append(pa.array(wkb, pa.binary(), from_pandas=True))
     if other:
-        notes.append(f"{other} shapes that are no polygons and no places are left out.")
+        are = counted(other, "shape is", "shapes are")
+        notes.append(f"{are} no polygon and no place: left out.")
     rows, parts = np.concatenate(kept), np.concatenate(part)
     if not len(rows):
         raise FormatError(

@@ -21,6 +21,7 @@ from geofield.farm.chunk import Done, Orders, Task
 from geofield.farm.engine import ONE_THREAD, Patience
 from geofield.farm.folder import sweep_chunk
 from geofield.farm.worker import ENDED, send
+from geofield.wording import counted
 
 #: What a worker is started with; what libraries warn of is not why it died.
 PROGRAM: Sequence[str] = (sys.executable, "-W", "ignore", "-m", "geofield.farm.worker")
@@ -46,7 +47,7 @@ class Pool:
     @property
     def where(self) -> str:
         """In words."""
-        return f"{self._count} worker{'s' if self._count > 1 else ''} on this machine"
+        return f"{counted(self._count, 'worker')} on this machine"
 
     def run(self, tasks: Iterator[Task], orders: Orders, stop: Event) -> Iterator[Done]:
         """Plan chunks; see `geofield.farm.engine.Engine`."""

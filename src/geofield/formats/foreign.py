@@ -167,8 +167,8 @@ def _mended(path: Path, layer: str | None) -> Any:
     frame = frame[~(frame.geom_type.str.endswith("Polygon") & (frame.geometry.area == 0.0))]
     lost = len(plain) - int(frame.geometry.notna().sum())
     closed = int(plain.isna().sum()) - lost
-    words = [f"{closed} with rings that were not closed: they are closed now"] if closed else []
-    words += [f"{lost} without a shape that can be: they are left out"] if lost else []
+    words = [f"{closed} with rings that were not closed, closed now"] if closed else []
+    words += [f"{lost} without a shape that can be, left out"] if lost else []
     warn(
         f"{path.name}: geometries that are damaged: {'; '.join(words)}. Look at them.",
         FormatWarning,

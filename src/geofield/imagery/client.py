@@ -24,6 +24,7 @@ from geofield.errors import ImageryError, NetworkError
 from geofield.imagery.gdal import USER_AGENT
 from geofield.imagery.opening import FetchOptions
 from geofield.imagery.reach import Reach
+from geofield.wording import counted
 
 T = TypeVar("T")
 
@@ -165,9 +166,10 @@ class Client:
                 self._keep_quiet(host, asked, trouble)
             self._pause(pause if asked is None else asked)
         if isinstance(last, GaveUpError):
-            raise GaveUpError(f"{last} {self.attempts} times")
+            raise GaveUpError(f"{last} {counted(self.attempts, 'time')}")
         raise NetworkError(
-            f"No answer from {host}: {self.redact(_plain(last))} ({self.attempts} attempts).",
+            f"No answer from {host}: {self.redact(_plain(last))} "
+            f"({counted(self.attempts, 'attempt')}).",
             hint="Check the network and the address. What was fetched is kept in the cache: repeat "
             "to go on, or use --offline to work from the cache alone.",
         )

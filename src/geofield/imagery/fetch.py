@@ -28,6 +28,7 @@ from geofield.imagery.client import BrokenBodyError, Client, GaveUpError, NotThe
 from geofield.imagery.sources.base import Tiles
 from geofield.imagery.sources.mbtiles import MBTilesSource
 from geofield.imagery.tiling import Block, Tile
+from geofield.wording import counted
 
 Progress = Callable[[int, int, str], None]
 
@@ -273,8 +274,8 @@ def absence_error(source: Tiles, report: FetchReport, *, offline: bool) -> Image
     """The error for a product with holes, or with nothing in it."""
     parts = [f"{count} x {reason}" for reason, count in report.reasons.most_common(4)]
     told = (
-        f"{report.absent} of {report.wanted} tiles of {source.name} could not be had "
-        f"({report.missing} are not there, {report.failed} failed): {'; '.join(parts)}."
+        f"{report.absent} of {counted(report.wanted, 'tile')} of {source.name} could not be had "
+        f"({report.missing} not there, {report.failed} failed): {'; '.join(parts)}."
     )
     if isinstance(source, MBTilesSource):
         hint = (

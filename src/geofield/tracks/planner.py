@@ -53,6 +53,7 @@ from geofield.tracks.tables import (
     segment_ends,
     segment_table,
 )
+from geofield.wording import counted
 
 #: Ten times what a large farm's field has; they take half a minute and a gigabyte.
 MOST_PIECES = 1_000_000
@@ -293,7 +294,8 @@ def _why(baseline: Baseline, least: int, count: int) -> str:
         return ""
     if least >= count:
         return f"{baseline.why}; no heading needs fewer tracks"
-    return f"{baseline.why}; direction fewest would need {least} tracks instead of {count}"
+    tracks = counted(least, "track")
+    return f"{baseline.why}; direction fewest would need {tracks} instead of {count}"
 
 
 def _refuse_too_many(outline: Polygon, shapes: ObstacleShapes, spacing: float, step: float) -> None:

@@ -13,6 +13,7 @@ from geofield.errors import FormatError
 from geofield.formats.agopengps.plane import ring_headings
 from geofield.formats.agopengps.read import boundary_rings, field_folder
 from geofield.formats.validation import Finding
+from geofield.wording import counted
 
 #: Headings are written with five decimals of vertices with three.
 HEADING_TOLERANCE = 0.01
@@ -59,7 +60,7 @@ def _check_ring(
     turned = np.abs((vertices[:, 2] - ring_headings(ring) + np.pi) % (2 * np.pi) - np.pi)
     wrong = int((turned > HEADING_TOLERANCE).sum())
     if wrong:
-        yield Finding("error", where, f"{wrong} headings do not fit")
+        yield Finding("error", where, f"{counted(wrong, 'heading does', 'headings do')} not fit")
     polygon = shapely.Polygon(ring)
     if not polygon.is_valid:
         yield Finding("error", where, "it crosses itself")

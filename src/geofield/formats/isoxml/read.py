@@ -121,14 +121,15 @@ def _told(field: ET.Element) -> Iterable[str]:
     """What was taken for obstacles without the name, and what is left out, for people."""
     found = Counter(str(element.get("A")) for element in field.findall("PLN"))
     for code, count in sorted(found.items()):
+        polygons = counted(count, "polygon")
         if code in _STANDING and code != PolygonType.OBSTACLE:
-            yield f"{count} of type {_STANDING[PolygonType(code)]} taken as obstacles"
+            yield f"{polygons} of type {_STANDING[PolygonType(code)]} taken as obstacles"
         elif code not in (*_STANDING, PolygonType.BOUNDARY):
             names = {each.value: each.name.lower().replace("_", " ") for each in PolygonType}
-            yield f"{counted(count, 'polygon')} left out: {names.get(code, f'type {code}')}"
+            yield f"{polygons} left out: {names.get(code, f'type {code}')}"
     zones = len(field.findall("TZN"))
     if zones:
-        yield f"{zones} treatment zones left out"
+        yield f"{counted(zones, 'treatment zone')} left out"
 
 
 def _obstacles(field: ET.Element, outline: Any) -> Iterable[dict[str, Any]]:
