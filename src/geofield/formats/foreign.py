@@ -86,7 +86,8 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
             hint="Name a layer with shapes; positions are read from CSV with columns lat and lon.",
         )
     if frame.crs is not None:
-        frame = frame.set_crs(said_crs(path, layer, frame.crs), allow_override=True)
+        said = said_crs(path, frame.crs, frame.geometry.to_numpy)
+        frame = frame.set_crs(said, allow_override=True)
     return _as_filled(_exact(frame, path, layer), path)
 
 

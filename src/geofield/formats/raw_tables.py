@@ -248,8 +248,9 @@ def _vector(path: Path, layer: str | None) -> RawTable:
     table = table.replace_schema_metadata(None)
     if name not in table.column_names:
         return RawTable(path.name, table)
-    crs = said_crs(path, layer, meta["crs"])
     geometry = table[name].combine_chunks()
+    binary = geometry.to_numpy(zero_copy_only=False)
+    crs = said_crs(path, meta["crs"], lambda: shapely.from_wkb(binary, on_invalid="ignore"))
     if _is_curved(geometry):  # only here GDAL makes lines of arcs
         geometry = pa.array(pyogrio.raw.read(path, layer=layer, columns=[])[2], pa.binary())
     return RawTable(path.name, table.drop_columns(name), geometry, name, crs)

@@ -5,9 +5,13 @@ from __future__ import annotations
 import json
 import sqlite3
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
 
 from geofield.crs import parse_crs
 from geofield.errors import CRSError
@@ -19,18 +23,16 @@ _ROUND_DEG = 360.0
 _HINT = "One file has one CRS: ogr2ogr -t_srs EPSG:4326 {} FILE, for each part by itself."
 
 
-def said_crs(path: Path, layer: str | None, crs: Any) -> Any:
+def said_crs(path: Path, crs: Any, shapes: Callable[[], NDArray[np.object_]]) -> Any:
     """The CRS that a file says, which is `crs` to GDAL.
 
-    A GeoJSON file without a word of it is in degrees by its standard alone: of numbers that are no
-    degrees it says none.
+    A GeoJSON file without a word of it is in degrees by its standard alone: where its `shapes` are
+    beyond all degrees it says none.
     """
     if path.suffix.lower() not in _GEOJSON or not path.is_file():
         return crs
-    import pyogrio
-
-    bounds = pyogrio.read_info(path, layer=layer, force_total_bounds=True)["total_bounds"]
-    beyond = bounds is not None and max(map(abs, bounds)) > _ROUND_DEG
+    bounds = np.abs(shapely.bounds(shapes()))
+    beyond = bool(np.any(bounds[np.isfinite(bounds)] > _ROUND_DEG))
     return None if beyond and b'"crs"' not in path.read_bytes() else crs
 
 
