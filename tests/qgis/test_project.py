@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from formats_plan import NAME, X0, Y0, make_dataset
 from PIL import Image
 
@@ -220,6 +221,22 @@ def test_a_headland_a_route_and_turns_are_shown(qgis, tmp_path):
     assert opened["layers"]["geofield_turns"]["rules"] == ["Turn", "Turn that does not fit"]
     png = tmp_path / "optional.png"
     assert qgis("render", uri=str(tmp_path / "field.qgz"), png=str(png))["errors"] == []
+
+
+def test_a_turn_that_does_not_fit_is_seen_along_an_obstacle(qgis, tmp_path):
+    """The obstacle's own line hid it."""
+    plan = make_dataset(points=False, optional=True)
+    around = plan.table("obstacles").geometry.iloc[1].exterior
+    turns = plan.table("turns").set_geometry([shapely.LineString(around.coords)], crs=plan.crs)
+    write_dataset(
+        dataclasses.replace(plan, tables={**plan.tables, "turns": turns}), tmp_path, ["gpkg"]
+    )
+    png = tmp_path / "turn.png"
+    extent = list(around.buffer(10).bounds)
+    qgis("render", uri=str(tmp_path / "field.qgz"), png=str(png), extent=extent)
+    with Image.open(png) as image:
+        picture = np.asarray(image.convert("RGB")).astype(int)
+    assert (np.abs(picture - theme.rgb(theme.UNFIT)).max(axis=2) < 25).sum() > 100
 
 
 def test_a_file_that_qgis_has_open_is_not_replaced(qgis_environment, tmp_path):

@@ -215,7 +215,7 @@ LOOKS: dict[str, Look] = {
     "turns": Look(
         (
             Rule("Turn", "line", (line(_BLACK, 0.45), line(_TURN, 0.25)), "\"fits\" = 'yes'"),
-            Rule("Turn that does not fit", "line", (line(_UNFIT, 0.6),), "\"fits\" = 'no'"),
+            Rule("Turn that does not fit", "line", (line(_UNFIT, 1.6),), "\"fits\" = 'no'"),
         ),
         max_scale=5000,
         tip='<b>Turn [% "turn_no" %]</b> from track [% "from_track" %] to [% "to_track" %]: '
