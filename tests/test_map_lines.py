@@ -10,9 +10,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import geopandas as gpd
+import numpy as np
 import pytest
+from PIL import Image
 
 import geofield as gf
+from geofield import theme
 from geofield.simulate import SimulatedField
 from geofield_command import run_geofield
 
@@ -57,7 +60,7 @@ def test_obstacles_have_their_numbers_and_turns_that_do_not_fit_are_told(
     plan = tmp_path / "route.gpkg"
     route = ("--route", "shortest", "--turning-radius", "6")
     run_geofield("tracks", maps / "field.gpkg", *route, "-o", plan, check=True)
-    run_geofield("export", plan, "-f", "map-svg", "--out", tmp_path, check=True)
+    run_geofield("export", plan, "-f", "map-svg,map", "--out", tmp_path, check=True)
     root = ET.parse(tmp_path / "map.svg").getroot()
     words = ["".join(each.itertext()) for each in root.iter(f"{SVG}text")]
     obstacles = gpd.read_file(plan, layer="obstacles")
@@ -68,6 +71,10 @@ def test_obstacles_have_their_numbers_and_turns_that_do_not_fit_are_told(
     assert f"{unfit} turns that do not fit" in words
     styles = [each.get("style", "") for each in root.iter(f"{SVG}path")]
     assert sum("stroke: #ff1744" in style for style in styles) == unfit + 1  # and the legend
+    with Image.open(tmp_path / "map.png") as image:
+        picture = np.asarray(image.convert("RGB")).astype(int)
+    shown = (np.abs(picture - theme.rgb(theme.UNFIT)).max(axis=2) < 40).sum()
+    assert shown > 10_000  # 13 800, and 6200 where obstacles' lines hid them
 
 
 @pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")

@@ -126,7 +126,7 @@ class _Canvas:
         self.lines(around.geometry, theme.HEADLAND, line)
         self.lines(route[route["kind"] != "work"].geometry, theme.TURN, line)
         self.lines(turns.geometry, theme.TURN, line)
-        self.lines(turns[turns["fits"] == "no"].geometry, theme.UNFIT, 2 * line)
+        self.lines(turns[turns["fits"] == "no"].geometry, theme.UNFIT, 4 * line)
         obstacles = self.dataset.table("obstacles")
         for status, look in theme.STATUS.items():
             part = obstacles[obstacles["status"] == status]
