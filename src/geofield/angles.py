@@ -1,8 +1,9 @@
-"""Latitude and longitude as people and receivers write them."""
+"""Angles: between lines, and as people and receivers write latitude and longitude."""
 
 from __future__ import annotations
 
 import re
+from typing import Any
 
 # An s of the seconds goes with an m of the minutes; without one it is the south.
 _ANGLE = re.compile(
@@ -14,6 +15,11 @@ _ANGLE = re.compile(
     (?P<after>[NSEW]?)""",
     re.VERBOSE | re.IGNORECASE,
 )
+
+
+def apart_deg(one: Any, other: Any) -> Any:
+    """The angle between lines that run in these directions, one way or back: 0 to 90 degrees."""
+    return abs((one - other + 90.0) % 180.0 - 90.0)
 
 
 def angle_of(text: str, letters: str) -> float | None:

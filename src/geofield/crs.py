@@ -29,6 +29,8 @@ PACIFIC = CRS.from_epsg(3832)
 
 #: Lengths, directions and areas on the ground.
 GEOD = Geod(ellps="WGS84")
+#: Metres of a degree on the equator: others are shorter.
+DEGREE_M = math.tau * GEOD.a / 360
 #: Arms of the cross that the scale is measured with: long against the digits of a coordinate,
 #: short against the earth.
 _ARM_M = 50.0
@@ -103,6 +105,11 @@ def is_metric(crs: CRS) -> bool:
         and "pseudo" not in crs.name.lower()
         and "web mercator" not in crs.name.lower()
     )
+
+
+def metre_in(crs: Any) -> float:
+    """A metre in the unit of a CRS; about, where that is degrees."""
+    return 1.0 / DEGREE_M if CRS(crs).is_geographic else 1.0
 
 
 def metric_crs(lon: float, lat: float, own: CRS | None = None) -> CRS:

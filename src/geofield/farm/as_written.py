@@ -12,9 +12,9 @@ import geopandas as gpd
 import numpy as np
 import pandas as pd
 import shapely
-from pyproj import CRS
 
 from geofield import schema
+from geofield.crs import metre_in
 from geofield.farm.layers import EPSG, FIELD_ID
 from geofield.model.written import SAME_M, same_shapes
 from geofield.plan import Plan
@@ -24,8 +24,6 @@ _WORDS = {
     schema.FIELD: ("name",),
     schema.OBSTACLES: ("obstacle_no", "kind", "status", "radius_m", "buffer_m"),
 }
-#: Of a degree on the equator: others are shorter.
-_DEGREE_M = 111_320.0
 
 
 def digests_of(fields: gpd.GeoDataFrame, obstacles: gpd.GeoDataFrame) -> dict[str, str]:
@@ -57,11 +55,10 @@ def unlike(
         mine, theirs = _shapes(now[of], words), _shapes(then[of], words)
         found.update(one for one, _ in mine.keys() ^ theirs.keys())
         both = list(mine.keys() & theirs.keys())
-        one_m = 1 / _DEGREE_M if CRS(now[of].crs).is_geographic else 1.0
         same = same_shapes(
             np.array([mine[key] for key in both], dtype=object),
             np.array([theirs[key] for key in both], dtype=object),
-            SAME_M * one_m,
+            SAME_M * metre_in(now[of].crs),
         )
         found.update(one for (one, _), is_same in zip(both, same, strict=True) if not is_same)
     return found

@@ -15,8 +15,10 @@ import shapely
 from numpy.typing import NDArray
 
 from geofield import schema
+from geofield.crs import metre_in
 from geofield.errors import FormatWarning
 from geofield.farm.layers import FIELD_ID
+from geofield.model.obstacles import active, idle
 from geofield.model.written import SAME_M, same_shapes
 from geofield.notes import warn
 from geofield.wording import counted, some_of
@@ -29,7 +31,6 @@ KEYS = {
 }
 #: How far a shape may reach out of one that it was merged into, metres.
 _OUT_M = 0.01
-_M_PER_DEGREE = 111_000.0
 #: Fields that are told by name.
 TOLD = 5
 
@@ -56,7 +57,7 @@ def undissolved(
     ids: set[str] = set()
     if not len(rows) or np.isin(before, now).all():
         return rows, ids
-    unit = 1.0 if written.crs.is_projected else 1.0 / _M_PER_DEGREE
+    unit = metre_in(written.crs)
     (parts, row), apart = _Parts.of(rows), _Parts.of(written)
     pairs = _Pairs.of(parts, row, apart, SAME_M * unit)
     gone, mine = ~np.isin(before, now)[pairs.written], now[pairs.row] == before[pairs.written]
@@ -188,13 +189,12 @@ def _where_it_lies(
 
 def _driven_around(rows: gpd.GeoDataFrame, gone: gpd.GeoDataFrame, out: float) -> gpd.GeoDataFrame:
     """Obstacles, and what one that is not driven around covers of other fields."""
-    gone = gone[~gone["status"].isin(schema.NOT_AVOIDED)]
+    gone = active(gone)
     inner = shapely.buffer(gone.geometry.to_numpy(), -out)
     one, row = rows.sindex.query(inner, predicate="covered_by")
-    idle = rows["status"].str.strip().str.lower().isin(schema.NOT_AVOIDED).to_numpy(bool)
     owner = gone[FIELD_ID].to_numpy(dtype=object)[one]
     elsewhere = rows[FIELD_ID].to_numpy(dtype=object)[row] != owner
-    taken = idle[row] & (elsewhere | rows["obstacle_no"].isna().to_numpy(bool)[row])
+    taken = idle(rows)[row] & (elsewhere | rows["obstacle_no"].isna().to_numpy(bool)[row])
     if not taken.any():
         return rows
     back = pd.DataFrame({"row": row[taken], "owner": owner[taken]}).drop_duplicates()

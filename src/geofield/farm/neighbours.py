@@ -9,10 +9,11 @@ import numpy as np
 import shapely
 
 from geofield import schema
-from geofield.crs import reproject
+from geofield.crs import metre_in, reproject
 from geofield.farm.layers import EPSG, FIELD_ID
 from geofield.farm.standing import with_rows
 from geofield.farm.value import Farm
+from geofield.model.obstacles import active
 from geofield.plan import Plan
 
 #: Ground that is not worth a row of its own, square metres.
@@ -30,7 +31,7 @@ def shared(edited: Mapping[str, Plan], farm: Farm) -> dict[str, Plan]:
     id, their obstacles as :func:`reconcile` leaves them; `farm` is as it was before the edits.
     """
     fields = farm.layer(schema.FIELD.name).set_index(FIELD_ID).geometry
-    before = _avoided(farm.layer(schema.OBSTACLES.name).to_crs(fields.crs))
+    before = active(farm.layer(schema.OBSTACLES.name).to_crs(fields.crs))
     outlines = fields.copy()
     for one, plan in edited.items():
         outlines[one] = reproject(plan.field.polygon, plan.field.crs, fields.crs)
@@ -59,27 +60,21 @@ def _standing(
     """What is avoided in edited fields, and what is avoided of others in their outlines."""
     for one, plan in edited.items():
         if plan.obstacles is not None:
-            yield one, _avoided(plan.obstacles)
+            yield one, active(plan.obstacles)
     reach = outlines[list(edited)].to_numpy()
     near = before.iloc[np.unique(before.sindex.query(reach, predicate="intersects")[1])]
     for one, rows in near[~near[FIELD_ID].isin(list(edited))].groupby(FIELD_ID):
         yield str(one), rows
 
 
-def _avoided(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
-    """The obstacles that tracks keep away from."""
-    return table[~table["status"].isin(schema.NOT_AVOIDED)]
-
-
 def _is_there(shape: shapely.Geometry, others: gpd.GeoSeries) -> bool:
     """Whether a shape is one of others."""
-    scale = _SAME_M if others.crs.is_projected else _SAME_M / 111_000.0
     near = others[others.intersects(shape)].to_numpy()
-    return bool((shapely.hausdorff_distance(near, shape) <= scale).any())
+    return bool((shapely.hausdorff_distance(near, shape) <= _SAME_M * metre_in(others.crs)).any())
 
 
 def _is_new_ground(plan: Plan, shape: shapely.Geometry) -> bool:
     """Whether a shape stands in a field where nothing is avoided yet."""
-    own = [] if plan.obstacles is None else _avoided(plan.obstacles).geometry.buffer(_SAME_M)
+    own = [] if plan.obstacles is None else active(plan.obstacles).geometry.buffer(_SAME_M)
     ground = shapely.intersection(shape, plan.field.polygon).difference(shapely.union_all(own))
     return bool(ground.area > _LEAST_M2)

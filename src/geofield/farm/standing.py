@@ -14,7 +14,7 @@ import pandas as pd
 import shapely
 
 from geofield import schema
-from geofield.crs import LONLAT, parse_crs
+from geofield.crs import DEGREE_M, LONLAT, parse_crs
 from geofield.errors import CRSError, FormatError, TrackError
 from geofield.farm.folder import read_parts
 from geofield.farm.layers import GEOMETRY
@@ -63,7 +63,6 @@ LAYERS = "layers"
 #: How far from a field something of the file may stand that reaches into it, metres.
 _NEAR = "near_m"
 _LINES = ("LineString", "LinearRing")
-_DEGREE_M = 111_000.0
 #: A longitude of -179.9 degrees is one of 180.1, too.
 _TURNS: tuple[float, ...] = (-360.0, 0.0, 360.0)
 
@@ -192,7 +191,7 @@ def any_reached(standing: gpd.GeoDataFrame, outlines_lonlat: Iterable[Shapes]) -
     """
     shapes = unwrapped(standing.to_crs(LONLAT).geometry.to_numpy())
     west, south, east, north = shapely.bounds(shapes).reshape(-1, 4).T
-    wide = _reach_m(standing) / _DEGREE_M
+    wide = _reach_m(standing) / DEGREE_M
     along = wide / np.maximum(np.cos(np.radians(south)), 0.01)
     west, east = west - along, east + along
     boxes = [shapely.box(west + turn, south - wide, east + turn, north + wide) for turn in _TURNS]

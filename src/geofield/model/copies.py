@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from geofield import schema
 from geofield.errors import FormatWarning
-from geofield.model.obstacles import active
+from geofield.model.obstacles import idle
 from geofield.model.written import SAME_M, Record, WrittenRow, same_shapes
 from geofield.notes import warn
 
@@ -79,8 +79,7 @@ def _standing(rows: gpd.GeoDataFrame, written: WrittenRow | None) -> tuple[NDArr
     elif len(different) == 1:
         words = f"what was changed in one of them holds ({in_words})"
     else:
-        around = rows.index.isin(active(rows).index)
-        avoided = {each for each, is_one in zip(said, around, strict=True) if is_one}
+        avoided = {each for each, passed in zip(said, idle(rows), strict=True) if not passed}
         different = [each for each in different if each in avoided] or different[:1]
         words = f"they contradict each other ({in_words}), and what is driven around holds"
     stand = np.zeros(len(rows), dtype=bool)

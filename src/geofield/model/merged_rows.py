@@ -12,7 +12,7 @@ from pyproj import CRS
 
 from geofield import schema
 from geofield.errors import FormatWarning
-from geofield.model.obstacles import active, circle_polygons, floats
+from geofield.model.obstacles import circle_polygons, floats, idle
 from geofield.model.resized import differ
 from geofield.model.written import Record, WrittenRow, same_shapes, shapes_of_plain
 from geofield.notes import warn
@@ -50,7 +50,7 @@ def parts_apart(obstacles: gpd.GeoDataFrame, record: Record | None = None) -> gp
     mixed = several[row] & ~known & np.isin(row, row[taken.at])
     table.loc[mixed, [*_WORDS, *_FOUND]] = None
     _write(table, taken.only(taken.same & mixed[taken.at]))
-    further = several[row] & ~mixed & _idle(table)
+    further = several[row] & ~mixed & idle(table)
     further[taken.at] = False
     _tell_further(table, row, further)
     return table
@@ -76,7 +76,7 @@ def unmerged(obstacles: gpd.GeoDataFrame, record: Record) -> gpd.GeoDataFrame:
     own = np.unique(numbers[taken.at[known]])
     _write(table, taken.only(taken.same & known))
     whole = taken.only(~taken.same & merged)
-    driven = whole.only(_idle(table)[whole.at] & whole.were_driven_around)
+    driven = whole.only(idle(table)[whole.at] & whole.were_driven_around)
     for one, at in zip(driven.rows, driven.at, strict=True):
         table.loc[at, "status"] = one.status
     _tell(driven.rows, "all of it is driven around")
@@ -121,11 +121,6 @@ class _Taken(NamedTuple):
 def _known(table: gpd.GeoDataFrame, record: Record) -> _Mask:
     """Which rows have a number that was written."""
     return np.isin(floats(table, "obstacle_no"), list(record))
-
-
-def _idle(table: gpd.GeoDataFrame) -> _Mask:
-    """Which rows are not driven around."""
-    return np.asarray(~table.index.isin(active(table).index), dtype=bool)
 
 
 def _write(table: gpd.GeoDataFrame, taken: _Taken) -> None:
@@ -175,7 +170,7 @@ def _keep_own(table: gpd.GeoDataFrame, own: list[WrittenRow]) -> None:
                     _warn(
                         f"Obstacle {one.obstacle_no}, which took in others, keeps {name} {before:g}"
                     )
-            if _idle(table)[at] and one.status not in schema.NOT_AVOIDED:
+            if idle(table)[at] and one.status not in schema.NOT_AVOIDED:
                 status = table.loc[at, "status"]
                 _warn(f"Obstacle {one.obstacle_no}, which took in others, is now {status} itself")
 

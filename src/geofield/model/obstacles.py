@@ -201,10 +201,13 @@ def active(obstacles: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
 
     Of a table without a column `status` all rows are.
     """
-    if "status" not in obstacles.columns:
-        return obstacles
+    return obstacles[~idle(obstacles)] if "status" in obstacles else obstacles
+
+
+def idle(obstacles: gpd.GeoDataFrame) -> NDArray[np.bool_]:
+    """Which rows are not driven around, by their `status`."""
     status = obstacles["status"].astype("string").str.strip().str.lower()
-    return obstacles[~status.isin(schema.NOT_AVOIDED).to_numpy(bool)]
+    return np.asarray(status.isin(schema.NOT_AVOIDED), bool)
 
 
 def next_number(table: gpd.GeoDataFrame, column: str = "obstacle_no") -> int:

@@ -12,6 +12,7 @@ import shapely
 from numpy.typing import NDArray
 
 from geofield import schema
+from geofield.angles import apart_deg
 from geofield.model.written import SAME_M
 
 if TYPE_CHECKING:
@@ -157,7 +158,7 @@ def as_text(lines: Any) -> str:
 
 def run_alike(lines: NDArray[np.object_], others: NDArray[np.object_]) -> NDArray[np.bool_]:
     """Whether lines run, one way or back, as others do, from their begin to their end."""
-    turned = np.abs((_heading_deg(lines) - _heading_deg(others) + 90) % 180 - 90)
+    turned = apart_deg(_heading_deg(lines), _heading_deg(others))
     return np.asarray(turned <= _TURNED_DEG)
 
 

@@ -17,6 +17,7 @@ from pyproj import CRS
 from shapely import Polygon
 
 from geofield import schema
+from geofield.angles import apart_deg
 from geofield.crs import grid_north_deg
 from geofield.model.obstacles import ObstacleShapes, polygons_around
 from geofield.model.own_values import with_own_values
@@ -125,7 +126,7 @@ def _line_of(
 ) -> int | None:
     """Which line of a layout was edited."""
     assert one.place is not None  # noqa: S101 - added tracks have no line
-    turned = abs((one.place.heading_deg - heading_deg + 90.0) % 180.0 - 90.0)
+    turned = apart_deg(one.place.heading_deg, heading_deg)
     across = float(frame.to_frame(one.place.x, one.place.y)[1])
     away = np.abs(positions - across)
     if abs(one.place.spacing_m - spacing_m) > _ALIKE * spacing_m or turned > _TURNED_DEG:

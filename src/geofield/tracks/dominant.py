@@ -16,6 +16,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import LineString, Polygon
 
+from geofield.angles import apart_deg
 from geofield.tracks.frame import FloatArray
 from geofield.tracks.longest_edge import StraightRun, longest_run, own_edges
 
@@ -75,5 +76,5 @@ def _pieces(
 
 def _alike(angle: FloatArray, other: Any) -> FloatArray:
     """1 for directions that are nearly the same, falling to 0 for those that are not."""
-    apart = np.abs((angle - other + 90.0) % 180.0 - 90.0)
+    apart = apart_deg(angle, other)
     return np.asarray(np.clip((_OTHER_DEG - apart) / (_OTHER_DEG - _SAME_DEG), 0.0, 1.0))

@@ -19,6 +19,7 @@ import shapely
 from numpy.typing import NDArray
 
 from geofield import __version__, schema
+from geofield.angles import apart_deg
 from geofield.crs import GEOD, ground_areas_m2, ground_scale_of
 from geofield.errors import FormatError, refuse_unknown
 from geofield.formats.arrow import to_lonlat
@@ -264,7 +265,7 @@ def _pattern(dataset: Dataset) -> _Pattern | None:
     known = np.sort(headings[np.isfinite(headings)])
     if not len(known):
         return None
-    turned = np.abs((headings - known[len(known) // 2] + 90.0) % 180.0 - 90.0)
+    turned = apart_deg(headings, known[len(known) // 2])
     kept = shapes[(turned < _SAME_DEG) & ~are_bent(shapes)]
     if not len(kept):
         return None

@@ -9,14 +9,13 @@ from xml.etree import ElementTree as ET
 
 from pyproj import CRS
 
-from geofield.crs import WEB_MERCATOR, is_metric, northing_first
+from geofield.crs import DEGREE_M, WEB_MERCATOR, is_metric, northing_first
 from geofield.errors import ImageryError
 from geofield.imagery.sources import ows
 from geofield.imagery.tiling import Tile, TileLevel, TilePyramid
 
 #: Metres per pixel at scale 1:1 in the standard (0.28 mm pixels).
 _PIXEL_M = 0.00028
-_METRES_PER_DEGREE = 111319.49079327358
 #: Side of the largest tile that is taken, pixels.
 _MOST_PX = 8192
 #: No place and no pixel of a map is beyond it, units of the CRS.
@@ -105,7 +104,7 @@ def _best_set(candidates: list[tuple[str, ET.Element]], address: str) -> tuple[s
 
 
 def _levels(element: ET.Element, crs: CRS) -> tuple[TileLevel, ...]:
-    unit_m = _METRES_PER_DEGREE if crs.is_geographic else crs.axis_info[0].unit_conversion_factor
+    unit_m = DEGREE_M if crs.is_geographic else crs.axis_info[0].unit_conversion_factor
     # The corner follows the authority's axis order when the CRS is named as a URN or an address.
     swapped = northing_first(crs) and not ows.text(element, "SupportedCRS").startswith("EPSG:")
     read = (_matrix(each, unit_m, swapped, crs) for each in ows.children(element, "TileMatrix"))
