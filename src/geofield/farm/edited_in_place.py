@@ -10,9 +10,9 @@ from geofield.errors import FieldWarning, FormatError, GeofieldError
 from geofield.farm.folder import REVIEWED, STATUS, read_parts
 from geofield.farm.folder import file_of as file_in
 from geofield.farm.layers import FIELD_ID
-from geofield.farm.put_settings import settings_put, settings_said
 from geofield.farm.reviewed import file_of, reviewed_files
 from geofield.farm.store import Store
+from geofield.farm.taken_out import settings_put, settings_said
 from geofield.farm.value import read_farm
 from geofield.notes import warn
 from geofield.plan import Plan, read_plan

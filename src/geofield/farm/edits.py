@@ -39,7 +39,7 @@ from geofield.farm.edited_plan import Edits, edited_plan, planned
 from geofield.farm.folder import REVIEWED, Record
 from geofield.farm.layers import FIELD_ID
 from geofield.farm.neighbours import shared
-from geofield.farm.put_back import put_plans
+from geofield.farm.put_back import keep_plans, refuse_unseen, replace_plans
 from geofield.farm.store import Store
 from geofield.farm.value import Farm, read_farm
 from geofield.formats import origin
@@ -348,17 +348,13 @@ def put_edits(
     plans = shared(edited, farm)
     if around is None:
         _tell_not_looked_up(store, farm, edited)
-
     put = [planned(plan) for plan in plans.values()]
-
-    def begin() -> None:
-        # Where all ends amid this, the same is done again, from the farm as it is until then.
-        store.note(BEGUN, [str(overview.absolute()), *plans])
-
-    def note() -> None:
-        store.note(TAKEN, taken | {one: edits.marks[one] for one in here})
-        store.remove(BEGUN)
-
     tell_double(store, overview, elsewhere)
-    put_plans(put, store, begin, note)
+    refuse_unseen(store, plans.keys())
+    # Where all ends amid this, the same is done again, from the farm as it is until then.
+    store.note(BEGUN, [str(overview.absolute()), *plans])
+    keep_plans(store, put)
+    store.note(TAKEN, taken | {one: edits.marks[one] for one in here})
+    store.remove(BEGUN)
+    replace_plans(store, put)
     return list(plans), waiting

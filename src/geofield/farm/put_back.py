@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,12 +19,18 @@ from geofield.farm.folder import REVIEWED, STATUS, read_part, read_parts, write_
 from geofield.farm.folder import file_of as file_in
 from geofield.farm.layers import FIELD_ID, KEPT, stacked, tables_of
 from geofield.farm.marks import CHANGED
-from geofield.farm.put_settings import note_settings, settings_put, settings_said
 from geofield.farm.reviewed import SUFFIX, file_of, reviewed_files
 from geofield.farm.standing import with_given
 from geofield.farm.status import Outcome, outcome_words, outcomes_of, status_table
 from geofield.farm.store import Store
-from geofield.farm.taken_out import note_put, refuse_changed, settings_taken
+from geofield.farm.taken_out import (
+    note_put,
+    note_settings,
+    refuse_changed,
+    settings_put,
+    settings_said,
+    settings_taken,
+)
 from geofield.farm.value import read_farm
 from geofield.farm.work import is_near, overlap
 from geofield.model.written import same_shapes
@@ -71,10 +77,11 @@ def put_back(plan_file: Path, folder: str | Path, *, anyway: bool = False) -> st
             f"{folder} has no field {field_id!r}.",
             hint="The field's id must be one of the farm's, which are in its farm.gpkg.",
         )
-    _refuse_unseen(store, {field_id}, but=plan_file)
+    refuse_unseen(store, {field_id}, but=plan_file)
     before = farm[field_id] if field_id in farm else None  # noqa: SIM401 - a farm has no get
     _refuse_elsewhere(plan, before, chunks)
-    mine = store.folder is not None and _is_file(store.folder / file_of(field_id), plan_file)
+    there = None if store.folder is None else store.folder / file_of(field_id)
+    mine = there is not None and there.is_file() and there.samefile(plan_file)
     if before is not None:
         if not (anyway or mine) and file_of(field_id) in reviewed_files(store):
             refuse_changed(plan, before, plan_file, store)
@@ -103,15 +110,10 @@ def put_back(plan_file: Path, folder: str | Path, *, anyway: bool = False) -> st
         # First what must not be lost; the tables follow from it.
         _put(store, field_id, file)
     note_settings(store, [plan])
-    _replace(store, [plan])
+    replace_plans(store, [plan])
     if not mine:
         note_put(read_farm(folder)[field_id], plan_file, store)
     return field_id
-
-
-def _is_file(there: Path, file: Path) -> bool:
-    """Whether a file is one that may be there."""
-    return there.is_file() and there.samefile(file)
 
 
 def _refuse_elsewhere(plan: Plan, before: Plan | None, chunks: Mapping[int, pa.Table]) -> None:
@@ -155,7 +157,7 @@ def take_in_place(store: Store, field_id: str) -> None:
         save_plan(plan, file, overwrite=True)
         _put(store, field_id, file)
     note_settings(store, [plan])
-    _replace(store, [plan])
+    replace_plans(store, [plan])
 
 
 def _with_said(plan: Plan, names: Iterable[str]) -> Plan:
@@ -181,7 +183,7 @@ def _put(store: Store, field_id: str, file: Path) -> None:
     store.put(file_of(field_id), file.read_bytes())
 
 
-def _refuse_unseen(store: Store, ids: Set[str], *, but: Path | None = None) -> None:
+def refuse_unseen(store: Store, ids: Set[str], *, but: Path | None = None) -> None:
     """Refuse to write over plans in `reviewed/` whose edits the farm has not taken in."""
     for one in edited_in_place(store, ids):
         file = Path(store.place) / file_of(one)
@@ -214,24 +216,14 @@ def _with_its_outline(plan: Plan, before: Plan) -> Plan:
     return replace(plan, field=replace(plan.field, method="drawn", quality=None))
 
 
-def put_plans(
-    plans: Sequence[Plan], store: Store, begin: Callable[[], None], note: Callable[[], None]
-) -> None:
-    """Put plans of fields of the farm back.
-
-    `begin` is called when nothing speaks against that any more, and `note` when none of them can
-    be lost.
-    """
-    _refuse_unseen(store, {plan.field.field_id for plan in plans})
-    begin()
+def keep_plans(store: Store, plans: Sequence[Plan]) -> None:
+    """Keep plans of fields of the farm: none of them can be lost any more."""
     with tempfile.TemporaryDirectory(prefix="geofield-") as name:
         file = Path(name) / "field.gpkg"
         for plan in plans:
             save_plan(plan, file, overwrite=True)
             _put(store, plan.field.field_id, file)
     note_settings(store, plans)
-    note()
-    _replace(store, plans)
 
 
 def _chunks_with(store: Store, ids: Set[str]) -> dict[int, pa.Table]:
@@ -243,7 +235,7 @@ def _chunks_with(store: Store, ids: Set[str]) -> dict[int, pa.Table]:
     }
 
 
-def _replace(store: Store, plans: Sequence[Plan]) -> None:
+def replace_plans(store: Store, plans: Sequence[Plan]) -> None:
     """Write chunks again with plans in the place of others."""
     by_id = {plan.field.field_id: plan for plan in plans}
     chunks = _chunks_with(store, by_id.keys())

@@ -1,13 +1,16 @@
 """Plans that were taken out of a farm: whether what they are put over is what they came from.
 
 A plan that is taken out notes what the farm's plan said then. A farm notes which file each plan
-was put back from, so that the same file can be put back again and again.
+was put back from, so that the same file can be put back again and again, and with which settings
+of its tracks. A later run plans with its own and leaves the plan in `reviewed/` as it is: that this
+has others tells nothing. That they are others than it was put with is a person's word.
 """
 
 from __future__ import annotations
 
 import hashlib
 import platform
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,12 +18,13 @@ from typing import Any
 from geofield.errors import FormatError
 from geofield.farm.as_written import plan_digest
 from geofield.farm.folder import REVIEWED
-from geofield.farm.put_settings import track_values
 from geofield.farm.store import Store
 from geofield.plan import Plan
 
 #: Which file each plan was put back from, and a digest of what it said.
 PUT = f"{REVIEWED}/.put.json"
+#: With which settings of its tracks, by field id.
+_PUT_SETTINGS = f"{REVIEWED}/.settings.json"
 #: What the farm's plan said, in the evidence of one that was taken out.
 _TAKEN = "taken"
 #: With which settings of its tracks.
@@ -70,3 +74,29 @@ def note_put(plan: Plan, plan_file: Path, store: Store) -> None:
 def _name_of(file: Path) -> str:
     """A file on this machine, without telling where it is."""
     return hashlib.sha256(f"{platform.node()}:{file.resolve()}".encode()).hexdigest()[:16]
+
+
+def note_settings(store: Store, plans: Iterable[Plan]) -> None:
+    """Note the settings of plans that were put into a farm."""
+    noted = settings_put(store) | {plan.field.field_id: track_values(plan) for plan in plans}
+    store.note(_PUT_SETTINGS, noted)
+
+
+def settings_put(store: Store) -> dict[str, dict[str, Any]]:
+    """The settings of the tracks of all plans that were put into a farm, by field id."""
+    noted: dict[str, dict[str, Any]] = store.noted(_PUT_SETTINGS)
+    return noted
+
+
+def settings_said(plan: Plan, put: dict[str, Any]) -> dict[str, Any]:
+    """Settings of the tracks that a plan has, and was not `put` with, or taken out with."""
+    now = {} if plan.settings is None else dict(plan.settings.tracks)
+    told = track_values(plan)
+    return {name: now[name] for name in told if name in put and put[name] != told[name]}
+
+
+def track_values(plan: Plan | None) -> dict[str, Any]:
+    """The settings of a plan's tracks as plain JSON values."""
+    if plan is None or plan.settings is None:
+        return {}
+    return plan.settings.tracks.model_dump(mode="json")
