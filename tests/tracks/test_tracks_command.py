@@ -481,6 +481,20 @@ def test_sizes_of_points_are_taken_as_they_are_meant(tmp_path: Path) -> None:
     assert found["radius_m"].tolist() == [6.5, 150.0]
 
 
+def test_a_wood_that_just_reaches_in_near_the_equator_is_not_told_as_elsewhere(
+    tmp_path: Path,
+) -> None:
+    """Degrees of latitude are 0.7 % shorter there: a wood of 100 m seemed to end 20 cm before."""
+    parcel = shapely.box(558000, 11000, 558100, 11080)
+    outline = gpd.GeoDataFrame(geometry=[parcel], crs=32636)
+    outline.to_file(tmp_path / "parcel.gpkg")
+    wood = shapely.Point(558050, 11080 + 99.8)
+    trees = standing(tmp_path / "trees.gpkg", [wood], 32636, radius_m=[100.0])
+    said = planned_around(tmp_path / "parcel.gpkg", trees, tmp_path / "plan.gpkg")
+    assert len(gpd.read_file(tmp_path / "plan.gpkg", layer="obstacles")) == 1
+    assert "avoided" not in said
+
+
 def test_all_layers_of_a_file_of_obstacles_are_avoided(tmp_path: Path) -> None:
     """Only the first was: of a KML with folders, or trees beside fences, the rest was lost."""
     outlines(1).to_file(tmp_path / "parcel.gpkg")

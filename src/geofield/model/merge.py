@@ -14,7 +14,7 @@ from pyproj import CRS
 from geofield import schema
 from geofield.grid import Grid
 from geofield.model.frame import Shown, ground
-from geofield.model.obstacles import active, floats, on_grid
+from geofield.model.obstacles import active, floats, idle, on_grid
 from geofield.model.written import Written, matches, shapes_of_plain
 from geofield.wording import counted, some_of
 
@@ -100,11 +100,11 @@ def merge(
     taken = [word.geometry.to_numpy(), shapes_of_plain(written.removed)]
     before = np.concatenate([earlier.geometry.to_numpy(), *taken])
     # What is driven around may have grown; of a shape that is not round nobody knows what it is.
-    around = np.append(np.ones(len(earlier), bool), ~word["status"].isin(schema.NOT_AVOIDED))
+    around = np.append(np.ones(len(earlier), bool), ~idle(word))
     most = _ANOTHER * shapely.area(before)
     most[: len(around)][around] = np.inf
     crown = np.pi * floats(detected, "radius_m") ** 2
-    crown[detected["status"].isin(schema.NOT_AVOIDED)] = 0.0
+    crown[idle(detected)] = 0.0
     match = matches(
         detected.geometry, before, once=True, apart=lambda row, other: crown[row] > most[other]
     )
@@ -160,8 +160,7 @@ def _outgrown(
     found: gpd.GeoDataFrame, said: gpd.GeoDataFrame, obstacles: gpd.GeoDataFrame
 ) -> tuple[int, ...]:
     """Numbers of rows that a person `said`, each found as in `found`, that grew out of all."""
-    sure = ~found["status"].isin(schema.NOT_AVOIDED).to_numpy(bool)
-    sure &= said["status"].isin({"confirmed", "added"}).to_numpy(bool)
+    sure = ~idle(found) & said["status"].isin({"confirmed", "added"}).to_numpy(bool)
     found, said = found[sure], said[sure]
     crowns = shapely.buffer(found.geometry.to_numpy(), -floats(found, "buffer_m"))
     some = shapely.area(crowns) * _OUTGROWN
