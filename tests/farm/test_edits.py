@@ -370,6 +370,22 @@ def test_edits_are_taken_in_after_a_kill_amid_that(
     assert "rejected" in set(after["c"].obstacles["status"])
 
 
+def test_what_lies_in_a_reviewed_plan_comes_along_when_the_overview_is_edited(folder: Path) -> None:
+    """A layer of one's own in reviewed/b.gpkg was left in b.gpkg.bak, which the next edit took."""
+    farm = folder / "farm"
+    geofield("farm", "get", farm, "b", "-o", folder / "b.gpkg")
+    geofield("farm", "put", folder / "b.gpkg", farm)
+    mine = gpd.GeoDataFrame({"memo": ["wet"]}, geometry=[shapely.Point(500_200, 5_300_050)])
+    mine.set_crs(32633).to_file(farm / "reviewed" / "b.gpkg", layer="visits")
+    _edit(folder, "obstacles", _tree_grown)
+    geofield("farm", "put", farm / "farm.gpkg", farm)
+    plans = farm / "reviewed"
+    assert gpd.read_file(plans / "b.gpkg", layer="visits")["memo"].tolist() == ["wet"]
+    standing = gpd.read_file(plans / "b.gpkg", layer="obstacles")
+    assert standing.geometry.area.max() > 100
+    assert "visits" not in pyogrio.list_layers(plans / "c.gpkg")[:, 0]
+
+
 def test_an_obstacle_copied_to_another_field_is_of_that_one(folder: Path) -> None:
     def copied(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
         row = table[table["field_id"] == "a"].iloc[[0]]

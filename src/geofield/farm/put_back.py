@@ -143,20 +143,15 @@ def take_in_place(store: Store, field_id: str) -> None:
     TrackError
         When its tracks cannot be planned again.
     """
-    edited = Path(store.place) / file_of(field_id)
     before = read_farm(store.place)[field_id]
-    plan = with_given(_with_its_outline(read_plan(edited), before), before)
+    edited = read_plan(Path(store.place, file_of(field_id)))
+    plan = with_given(_with_its_outline(edited, before), before)
     settings = before.settings or plan.settings or Settings()
     said = settings_said(plan, settings_put(store).get(field_id, {}))
     tracks = settings.tracks.model_copy(update=said)
     settings = settings.model_copy(update={"tracks": tracks})
     plan = run_tracks(_with_said(plan, said), settings=settings)
-    with tempfile.TemporaryDirectory(prefix="geofield-") as name:
-        file = Path(name) / "field.gpkg"
-        copy_whole(edited, file)
-        save_plan(plan, file, overwrite=True)
-        _put(store, field_id, file)
-    note_settings(store, [plan])
+    keep_plans(store, [plan])
     replace_plans(store, [plan])
 
 
@@ -217,12 +212,19 @@ def _with_its_outline(plan: Plan, before: Plan) -> Plan:
 
 
 def keep_plans(store: Store, plans: Sequence[Plan]) -> None:
-    """Keep plans of fields of the farm: none of them can be lost any more."""
-    with tempfile.TemporaryDirectory(prefix="geofield-") as name:
-        file = Path(name) / "field.gpkg"
-        for plan in plans:
+    """Keep plans of fields of the farm: none of them can be lost any more.
+
+    What a person has in the file of one that is there comes along.
+    """
+    for plan in plans:
+        field_id = plan.field.field_id
+        there = Path(store.place, file_of(field_id))
+        with tempfile.TemporaryDirectory(prefix="geofield-") as name:
+            file = Path(name) / "field.gpkg"
+            if there.is_file():
+                copy_whole(there, file)
             save_plan(plan, file, overwrite=True)
-            _put(store, plan.field.field_id, file)
+            _put(store, field_id, file)
     note_settings(store, plans)
 
 
