@@ -386,6 +386,25 @@ def test_what_lies_in_a_reviewed_plan_comes_along_when_the_overview_is_edited(fo
     assert "visits" not in pyogrio.list_layers(plans / "c.gpkg")[:, 0]
 
 
+def test_what_lies_in_a_reviewed_plan_comes_along_when_another_is_put_there(folder: Path) -> None:
+    """It was left in b.gpkg.bak; what the plan that is put has of that name holds."""
+    farm, file = folder / "farm", folder / "b.gpkg"
+    geofield("farm", "get", farm, "b", "-o", file)
+    geofield("farm", "put", file, farm)
+    there = farm / "reviewed" / "b.gpkg"
+    mine = gpd.GeoDataFrame({"memo": ["wet"]}, geometry=[shapely.Point(500_200, 5_300_050)])
+    mine = mine.set_crs(32633)
+    for layer in ("visits", "stones"):
+        mine.to_file(there, layer=layer)
+    mine.assign(memo="dry").to_file(file, layer="stones")
+    table = gpd.read_file(file, layer="obstacles")
+    table.assign(status="rejected").to_file(file, layer="obstacles")
+    geofield("farm", "put", file, farm)
+    assert gpd.read_file(there, layer="visits")["memo"].tolist() == ["wet"]
+    assert gpd.read_file(there, layer="stones")["memo"].tolist() == ["dry"]
+    assert set(gpd.read_file(there, layer="obstacles")["status"]) == {"rejected"}
+
+
 def test_an_obstacle_copied_to_another_field_is_of_that_one(folder: Path) -> None:
     def copied(table: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
         row = table[table["field_id"] == "a"].iloc[[0]]

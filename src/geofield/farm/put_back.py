@@ -33,6 +33,7 @@ from geofield.farm.taken_out import (
 )
 from geofield.farm.value import read_farm
 from geofield.farm.work import is_near, overlap
+from geofield.formats.gpkg_guests import bring_guests
 from geofield.model.written import same_shapes
 from geofield.notes import warn
 from geofield.pipeline import run_tracks
@@ -80,8 +81,8 @@ def put_back(plan_file: Path, folder: str | Path, *, anyway: bool = False) -> st
     refuse_unseen(store, {field_id}, but=plan_file)
     before = farm[field_id] if field_id in farm else None  # noqa: SIM401 - a farm has no get
     _refuse_elsewhere(plan, before, chunks)
-    there = None if store.folder is None else store.folder / file_of(field_id)
-    mine = there is not None and there.is_file() and there.samefile(plan_file)
+    there = Path(store.place, file_of(field_id))
+    mine = there.is_file() and there.samefile(plan_file)
     if before is not None:
         if not (anyway or mine) and file_of(field_id) in reviewed_files(store):
             refuse_changed(plan, before, plan_file, store)
@@ -105,8 +106,12 @@ def put_back(plan_file: Path, folder: str | Path, *, anyway: bool = False) -> st
                 )
                 warn(f"{plan.field.name}: {why} are planned again.", FieldWarning)
             plan = run_tracks(plan, settings=settings)
-        if not (whole and plan is known):
+        another = there.is_file() and not mine
+        if another or not (whole and plan is known):
             save_plan(plan, file, overwrite=True)
+        if another:
+            # Layers and the like of a person's own that this file has not.
+            bring_guests(there, file, further=True)
         # First what must not be lost; the tables follow from it.
         _put(store, field_id, file)
     note_settings(store, [plan])

@@ -45,13 +45,14 @@ def replace_plan(there: Path, new: Path) -> None:
     keep_project(there.with_suffix(".qgz"), new.with_suffix(".qgz"))
 
 
-def bring_guests(earlier: Path, plan_file: Path) -> None:
+def bring_guests(earlier: Path, plan_file: Path, *, further: bool = False) -> None:
     """Copy what is not geofield's from an earlier plan's file into the new one.
 
     Layers with features or attributes alone come with their reference system, index and triggers;
     plain tables and views as they are; styles and projects where the new file has none of the
     name, or a person saved theirs over geofield's; metadata of all layers that are there. A style
-    that a person made the default of a layer stays so. Files that are no plan bring nothing.
+    that a person made the default of a layer stays so. Files that are no plan bring nothing. Into
+    a file that a person edited, too, comes what that has nothing of (`further`).
 
     Raises
     ------
@@ -68,6 +69,8 @@ def bring_guests(earlier: Path, plan_file: Path) -> None:
         if schema.FIELD.name not in kinds:
             return
         ours = own_layers(connection, "old") | _OF_QGIS
+        if further:
+            ours |= {name for name in kinds if _has(connection, "main", name)}
         left = _bring_tables(connection, kinds, ours)
         _bring_styles(connection)
         _bring_projects(connection)
@@ -178,7 +181,7 @@ def _bring_styles(connection: sqlite3.Connection) -> None:
     mine += " AND f_table_name IN (SELECT table_name FROM main.gpkg_contents)"
     connection.execute("BEGIN")
     connection.execute(
-        f"DELETE FROM main.layer_styles WHERE {key} IN "  # noqa: S608
+        f"DELETE FROM main.layer_styles WHERE as_written(styleQML) AND {key} IN "  # noqa: S608
         f"(SELECT {key} FROM old.layer_styles WHERE NOT as_written(styleQML))"
     )
     connection.execute(
@@ -192,8 +195,11 @@ def _bring_styles(connection: sqlite3.Connection) -> None:
 def _bring_projects(connection: sqlite3.Connection) -> None:
     if not _has(connection, "old", "qgis_projects"):
         return
-    for name, content in connection.execute("SELECT name, content FROM old.qgis_projects"):
-        if not _is_own_project(content):
+    for name, old, new in connection.execute(
+        "SELECT name, old.content, main.content "
+        "FROM old.qgis_projects AS old JOIN main.qgis_projects AS main USING (name)"
+    ).fetchall():
+        if _is_own_project(new) and not _is_own_project(old):
             connection.execute("DELETE FROM main.qgis_projects WHERE name = ?", (name,))
     new = "(SELECT name FROM main.qgis_projects)"
     _fill(connection, "qgis_projects", f"WHERE name NOT IN {new}")
