@@ -51,7 +51,7 @@
     <message>
       <location filename="algorithm.py" />
       <source>The layer {0} is being edited: end that first, its file is replaced.</source>
-      <translation>Die Ebene {0} wird bearbeitet: beenden Sie das zuerst, ihre Datei wird ersetzt.</translation>
+      <translation>Der Layer {0} wird bearbeitet: beenden Sie das zuerst, seine Datei wird ersetzt.</translation>
     </message>
     <message>
       <location filename="algorithm.py" />
@@ -86,7 +86,7 @@
     <message>
       <location filename="algorithms.py" />
       <source>Find the outline</source>
-      <translation>Umriss finden</translation>
+      <translation>Feldgrenze finden</translation>
     </message>
     <message>
       <location filename="algorithms.py" />
@@ -191,12 +191,12 @@
     <message>
       <location filename="dock.py" />
       <source>Previous</source>
-      <translation>Zurück</translation>
+      <translation>Voriges</translation>
     </message>
     <message>
       <location filename="dock.py" />
       <source>Next</source>
-      <translation>Weiter</translation>
+      <translation>Nächstes</translation>
     </message>
     <message>
       <location filename="dock.py" />
@@ -221,7 +221,7 @@
     <message>
       <location filename="dock.py" />
       <source>Move: click its middle</source>
-      <translation>Versetzen: Mitte anklicken</translation>
+      <translation>Verschieben: Mitte anklicken</translation>
     </message>
     <message>
       <location filename="dock.py" />
@@ -271,7 +271,7 @@
     <message>
       <location filename="engine.py" />
       <source>Stopped; nothing half-written is left.</source>
-      <translation>Angehalten; nichts halb Geschriebenes bleibt zurück.</translation>
+      <translation>Abgebrochen; nichts halb Geschriebenes bleibt zurück.</translation>
     </message>
     <message>
       <location filename="engine.py" />
@@ -291,7 +291,7 @@
     <message>
       <location filename="engine.py" />
       <source>The engine {command} does not start: repair it under Plugins &gt; geofield &gt; Engine...</source>
-      <translation>Das Rechenprogramm {command} startet nicht: richten Sie es unter Erweiterungen &gt; geofield &gt; Rechenprogramm...</translation>
+      <translation>Das Rechenprogramm {command} startet nicht: reparieren Sie es unter Erweiterungen &gt; geofield &gt; Rechenprogramm...</translation>
     </message>
     <message>
       <location filename="engine_dialog.py" />
@@ -311,7 +311,7 @@
     <message>
       <location filename="engine_dialog.py" />
       <source>Install or update</source>
-      <translation>Installieren oder erneuern</translation>
+      <translation>Installieren oder aktualisieren</translation>
     </message>
     <message>
       <location filename="engine_dialog.py" />
@@ -356,7 +356,7 @@
     <message>
       <location filename="file_algorithms.py" />
       <source>Compare with a truth</source>
-      <translation>Mit der Wahrheit vergleichen</translation>
+      <translation>Mit einer Referenz vergleichen</translation>
     </message>
     <message>
       <location filename="file_algorithms.py" />
@@ -391,7 +391,7 @@
     <message>
       <location filename="file_algorithms.py" />
       <source>Truth</source>
-      <translation>Wahrheit</translation>
+      <translation>Referenz</translation>
     </message>
     <message>
       <location filename="file_algorithms.py" />
@@ -426,7 +426,7 @@
     <message>
       <location filename="install.py" />
       <source>The engine there is in use: close geofield's panel in QGIS, then repeat.</source>
-      <translation>Die Engine dort ist in Gebrauch: schließen Sie das Fenster von geofield in QGIS und wiederholen Sie.</translation>
+      <translation>Das Rechenprogramm dort ist in Gebrauch: schließen Sie das Bedienfeld von geofield in QGIS und wiederholen Sie.</translation>
     </message>
     <message>
       <location filename="install.py" />
@@ -446,7 +446,7 @@
     <message>
       <location filename="planner.py" />
       <source>Finding the outline...</source>
-      <translation>Der Umriss wird gesucht...</translation>
+      <translation>Die Feldgrenze wird gesucht...</translation>
     </message>
     <message>
       <location filename="planner.py" />
@@ -461,7 +461,7 @@
     <message>
       <location filename="planner.py" />
       <source>Stop</source>
-      <translation>Anhalten</translation>
+      <translation>Abbrechen</translation>
     </message>
     <message>
       <location filename="planner.py" />
@@ -471,7 +471,7 @@
     <message>
       <location filename="planner.py" />
       <source>Whether the terms of {0} allow this is for you to say: use Plan a field in the toolbox, or a picture of your own.</source>
-      <translation>Ob die Bedingungen von {0} das erlauben, müssen Sie sagen: nehmen Sie Ein Feld planen in der Werkzeugkiste oder ein eigenes Bild.</translation>
+      <translation>Ob die Bedingungen von {0} das erlauben, müssen Sie sagen: nehmen Sie Ein Feld planen aus den Verarbeitungswerkzeugen oder ein eigenes Bild.</translation>
     </message>
     <message>
       <location filename="planner.py" />
@@ -481,7 +481,7 @@
     <message>
       <location filename="review.py" />
       <source>Move obstacle</source>
-      <translation>Hindernis versetzen</translation>
+      <translation>Hindernis verschieben</translation>
     </message>
     <message>
       <location filename="review.py" />
@@ -521,7 +521,7 @@
     <message>
       <location filename="review_labels.py" />
       <source>added by hand</source>
-      <translation>von Hand</translation>
+      <translation>von Hand ergänzt</translation>
     </message>
     <message>
       <location filename="review_labels.py" />
@@ -541,7 +541,7 @@
     <message>
       <location filename="review_labels.py" />
       <source>Choose a layer of a plan, then press the button.</source>
-      <translation>Wählen Sie einen Layer eines Plans und drücken Sie den Knopf.</translation>
+      <translation>Wählen Sie einen Layer eines Plans und klicken Sie auf die Schaltfläche.</translation>
     </message>
     <message>
       <location filename="review_labels.py" />
@@ -551,7 +551,7 @@
     <message>
       <location filename="review_labels.py" />
       <source>{0} left to look at</source>
-      <translation>{0} noch anzusehen</translation>
+      <translation>{0} noch zu prüfen</translation>
     </message>
     <message>
       <location filename="review_labels.py" />
@@ -566,7 +566,7 @@
     <message>
       <location filename="review_labels.py" />
       <source>, outline {0:.0%} certain</source>
-      <translation>, Umriss zu {0:.0%} sicher</translation>
+      <translation>, Feldgrenze zu {0:.0%} sicher</translation>
     </message>
     <message>
       <location filename="review_labels.py" />
@@ -611,7 +611,7 @@
     <message>
       <location filename="description.json" />
       <source>From a picture and a point in a field, or its boundary, to outline, obstacles and tracks.</source>
-      <translation>Vom Bild und einem Punkt im Feld, oder seiner Grenze, zu Umriss, Hindernissen und Fahrspuren.</translation>
+      <translation>Vom Bild und einem Punkt im Feld, oder seiner Grenze, zu Feldgrenze, Hindernissen und Fahrspuren.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -621,12 +621,12 @@
     <message>
       <location filename="description.json" />
       <source>Find the outline of the field around a point.</source>
-      <translation>Den Umriss des Feldes um einen Punkt finden.</translation>
+      <translation>Die Grenze des Feldes um einen Punkt finden.</translation>
     </message>
     <message>
       <location filename="description.json" />
       <source>IMAGERY is a picture or any other source that `geofield tiles` takes. Where the outline touches the window's edge, the window grows as far as the picture reaches.</source>
-      <translation>Das Bild ist eine Datei oder eine andere Quelle, die auch „Luftbild holen“ nimmt. Wo der Umriss den Rand des Ausschnitts berührt, wächst der Ausschnitt, so weit das Bild reicht.</translation>
+      <translation>Das Bild ist eine Datei oder eine andere Quelle, die auch „Luftbild holen“ nimmt. Wo die Feldgrenze den Rand des Ausschnitts berührt, wächst der Ausschnitt, so weit das Bild reicht.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -696,12 +696,12 @@
     <message>
       <location filename="description.json" />
       <source>Compare DETECTED obstacles with a TRUTH of points, boxes or polygons, which may be a CSV.</source>
-      <translation>Erkannte Hindernisse mit einer Wahrheit aus Punkten, Rechtecken oder Polygonen vergleichen, auch aus einer CSV-Datei.</translation>
+      <translation>Erkannte Hindernisse mit einer Referenz aus Punkten, Rechtecken oder Polygonen vergleichen, auch aus einer CSV-Datei.</translation>
     </message>
     <message>
       <location filename="description.json" />
       <source>TRUTH may be a plan that a person reviewed: what they rejected is no true obstacle. Matching is one to one. Prints precision, recall, F1 and the error of the radii with 95 % intervals. With --driving also how many true obstacles the plan's tracks run through, within 2 m of their centres, what ground false ones cost, and how many the confidences say stand among those that are merely possible.</source>
-      <translation>Die Wahrheit darf ein durchgesehener Plan sein: was darin verworfen wurde, ist kein wahres Hindernis. Zugeordnet wird eins zu eins. Das Ergebnis sind Precision, Recall, F1 und der Fehler der Radien mit Intervallen von 95 %. Auf Wunsch auch, durch wie viele wahre Hindernisse die Fahrspuren des Plans führen (höchstens 2 m neben ihrer Mitte), welchen Boden falsche kosten und wie viele wahre den Sicherheiten nach unter den nur möglichen sind.</translation>
+      <translation>Die Referenz darf ein durchgesehener Plan sein: was darin verworfen wurde, ist kein wahres Hindernis. Zugeordnet wird eins zu eins. Das Ergebnis sind Precision, Recall, F1 und der Fehler der Radien mit Intervallen von 95 %. Auf Wunsch auch, durch wie viele wahre Hindernisse die Fahrspuren des Plans führen (höchstens 2 m neben ihrer Mitte), welchen Boden falsche kosten und wie viele wahre den Sicherheiten nach unter den nur möglichen sind.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -711,7 +711,7 @@
     <message>
       <location filename="description.json" />
       <source>PLACES is a file with a row per field: points (CSV or Parquet with columns lat and lon, or any vector file) or parcels (polygons), whose outlines are taken as they are. Columns named like settings (spacing_m, heading_deg, name, ...) hold for their field; all others come along. IMAGERY is whatever `geofield run` takes; parcels need none.</source>
-      <translation>Die Orte haben eine Zeile je Feld: Punkte oder Schläge (Polygone), deren Umrisse so genommen werden, wie sie sind. Spalten, die wie Einstellungen heißen (spacing_m, heading_deg, name, ...), gelten für ihr Feld; alle anderen kommen mit. Das Bild ist, was auch „Ein Feld planen“ nimmt; Schläge brauchen keines.</translation>
+      <translation>Die Orte haben eine Zeile je Feld: Punkte oder Schläge (Polygone), deren Grenzen so genommen werden, wie sie sind. Spalten, die wie Einstellungen heißen (spacing_m, heading_deg, name, ...), gelten für ihr Feld; alle anderen kommen mit. Das Bild ist, was auch „Ein Feld planen“ nimmt; Schläge brauchen keines.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -756,7 +756,7 @@
     <message>
       <location filename="description.json" />
       <source>How the outline is found: auto (colour, near infrared, edges) or study (brightness threshold).</source>
-      <translation>Wie der Umriss gefunden wird: auto (Farbe, nahes Infrarot, Kanten) oder study (Helligkeitsschwelle).</translation>
+      <translation>Wie die Feldgrenze gefunden wird: auto (Farbe, nahes Infrarot, Kanten) oder study (Helligkeitsschwelle).</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -786,7 +786,7 @@
     <message>
       <location filename="description.json" />
       <source>How far the straightened outline may leave the pixels; 0 keeps them all.</source>
-      <translation>Wie weit der begradigte Umriss von den Pixeln abweichen darf; 0 behält alle.</translation>
+      <translation>Wie weit die begradigte Feldgrenze von den Pixeln abweichen darf; 0 behält alle.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -961,7 +961,7 @@
     <message>
       <location filename="description.py" />
       <source>Width (m)</source>
-      <translation>Breite (m)</translation>
+      <translation>Arbeitsbreite (m)</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1271,7 +1271,7 @@
     <message>
       <location filename="description.py" />
       <source>Lat</source>
-      <translation>Breite</translation>
+      <translation>Geografische Breite</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1281,7 +1281,7 @@
     <message>
       <location filename="description.py" />
       <source>Lon</source>
-      <translation>Länge</translation>
+      <translation>Geografische Länge</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1306,7 +1306,7 @@
     <message>
       <location filename="description.json" />
       <source>Replace earlier products there; reviewed obstacles and a moved outline are kept.</source>
-      <translation>Frühere Ergebnisse dort ersetzen; Durchgesehenes und ein verschobener Umriss bleiben.</translation>
+      <translation>Frühere Ergebnisse dort ersetzen; Durchgesehenes und eine verschobene Feldgrenze bleiben.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1406,7 +1406,7 @@
     <message>
       <location filename="description.json" />
       <source>Replace the output where it exists; an outline drawn by hand is kept.</source>
-      <translation>Das Ergebnis ersetzen, wenn es schon da ist; ein von Hand gezeichneter Umriss bleibt.</translation>
+      <translation>Das Ergebnis ersetzen, wenn es schon da ist; eine von Hand gezeichnete Feldgrenze bleibt.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1446,7 +1446,7 @@
     <message>
       <location filename="description.json" />
       <source>Show the most likely different outlines; the file's layer alternatives has them.</source>
-      <translation>Die wahrscheinlichsten anderen Umrisse zeigen; sie stehen im Layer alternatives der Datei.</translation>
+      <translation>Die wahrscheinlichsten anderen Feldgrenzen zeigen; sie stehen im Layer alternatives der Datei.</translation>
     </message>
     <message>
       <location filename="description.py" />
@@ -1456,7 +1456,7 @@
     <message>
       <location filename="description.json" />
       <source>Take this outline of the alternatives: your word, kept on every later run.</source>
-      <translation>Diesen der anderen Umrisse nehmen: Ihre Entscheidung, die bei jedem weiteren Lauf gilt.</translation>
+      <translation>Diese der anderen Feldgrenzen nehmen: Ihre Entscheidung, die bei jedem weiteren Lauf gilt.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1851,7 +1851,7 @@
     <message>
       <location filename="description.py" />
       <source>Truth layer</source>
-      <translation>Layer der Wahrheit</translation>
+      <translation>Layer der Referenz</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1921,7 +1921,7 @@
     <message>
       <location filename="description.py" />
       <source>Workers</source>
-      <translation>Arbeiter</translation>
+      <translation>Prozesse</translation>
     </message>
     <message>
       <location filename="description.json" />
