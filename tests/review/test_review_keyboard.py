@@ -101,6 +101,7 @@ def test_a_whole_review_by_keys_alone(hands: Hands, folder: Path) -> None:
     order = hands.tab_to("")  # around the whole page, once
     assert order.index("plans") < order.index("more") < order.index("select") < order.index("map")
     assert order.index("map") < order.index("next") < order.index("spacing_m")
+    assert sum(name.isdigit() for name in order) == 1  # all obstacles are one stop
 
     # Every obstacle has a word.
     hands.press_on("next")
@@ -202,6 +203,47 @@ def test_a_whole_review_by_keys_alone(hands: Hands, folder: Path) -> None:
     assert after.tracks is not None
     (lines,) = (folder / "export").rglob("guidance.shp")
     assert len(gpd.read_file(lines)) == len(after.tracks.segments)
+
+
+def test_the_list_is_gone_through_by_arrow_keys(hands: Hands) -> None:
+    page = hands.page
+    listed = page.run(
+        "return [...document.querySelectorAll('#list [role=option]')].map(one => one.dataset.no)"
+    )
+    chosen = (
+        "return [...document.querySelectorAll('#list [aria-selected=true]')]"
+        ".map(one => one.dataset.no)"
+    )
+    hands.tab_to(listed[0])
+    assert page.run(chosen) == []  # to come by chooses nothing
+    before = page.state()["obstacles"]
+    for key, place in (
+        (Keys.ARROW_DOWN, 1), (Keys.END, -1), (Keys.ARROW_DOWN, -1), (Keys.ARROW_UP, -2),
+        (Keys.HOME, 0), (Keys.ARROW_UP, 0), (Keys.PAGE_DOWN, 5), (Keys.ARROW_RIGHT, 5), ("j", 6),
+    ):  # fmt: skip
+        page.press(key)
+        page.wait(lambda place=place: page.run(chosen) == [listed[place]])
+        assert page.run(_FOCUS) == [listed[place], 3, True], key
+    assert page.state()["obstacles"] == before  # none was moved
+    tree = page.driver.execute_cdp_cmd("Accessibility.getFullAXTree", {})["nodes"]
+    rows = [one for one in tree if one["role"]["value"] == "option" and one["name"]["value"]]
+    obstacles = [one for one in rows if one["name"]["value"].startswith(f"{listed[6]} detected ")]
+    assert len(obstacles) == 1, [one["name"]["value"] for one in rows]
+
+    # A word goes on to the next row, and Tab leaves the list, and comes back to the chosen one.
+    page.press("r")
+    page.wait(lambda: page.run(chosen) == [listed[7]])
+    assert page.run(_FOCUS)[0] == listed[7]
+    page.chord(Keys.SHIFT, Keys.TAB)
+    assert page.run(_FOCUS)[0] == "reject"
+    hands.tab_to(listed[7])
+    # From the list to the map, where the arrow keys move the obstacle.
+    page.press("m", Keys.ARROW_RIGHT)
+    at = next(one["centre"] for one in before if str(one["no"]) == listed[7])
+    page.wait(
+        lambda: page.obstacle(int(listed[7]))["centre"][0] == pytest.approx(at[0] + 0.5, abs=0.01)
+    )
+    hands.end()
 
 
 def test_shapes_ground_and_lengths_by_keys(hands: Hands) -> None:

@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any, cast, get_args
 
@@ -127,7 +128,7 @@ def test_drawing_moving_and_resizing_with_the_pointer(page: Page) -> None:
     page.click(*added["centre"])
     page.wait(
         lambda: (
-            page.run("return document.querySelector('#list [aria-current=true] b').textContent")
+            page.run("return document.querySelector('#list [aria-selected=true] b').textContent")
             == str(number)
         )
     )
@@ -184,7 +185,7 @@ def test_what_is_done_is_spoken_and_done_without_a_pointer(page: Page) -> None:
     page.press("j")
     page.wait(lambda: spoken().startswith("Obstacle"))
     first = int(
-        page.run("return document.querySelector('#list [aria-current=true] b').textContent")
+        page.run("return document.querySelector('#list [aria-selected=true] b').textContent")
     )
     page.press("c")
     # The word that was given, then the next one that waits for a word.
@@ -393,11 +394,11 @@ def test_an_undone_edit_is_shown_and_keys_speak_of_it(page: Page) -> None:
 
     def chosen() -> str:
         return str(
-            page.run("return document.querySelector('#list [aria-current=true] b').textContent")
+            page.run("return document.querySelector('#list [aria-selected=true] b').textContent")
         )
 
     page.press("c")  # nothing is chosen yet: the most doubtful is shown first
-    page.wait(lambda: page.run("return document.querySelector('#list [aria-current=true]')"))
+    page.wait(lambda: page.run("return document.querySelector('#list [aria-selected=true]')"))
     first = chosen()
     assert not page.state()["can_undo"]
     page.press("c", "r")
@@ -484,11 +485,28 @@ def test_counts_are_right_for_one(driver: webdriver.Chrome, plan_path: Path) -> 
 
 def test_numbers_of_obstacles_lie_over_no_others(page: Page) -> None:
     """11 beside 109 was read as 1109."""
-    sparse = page.driver.execute_async_script(
-        "const [done] = arguments; import('/map.js').then(({map, sources}) => done(map.getLayers()"
-        ".getArray().find(one => one.getSource() === sources.obstacles).getDeclutter()));"
+    # Every number that is drawn, and the box of its letters in the picture.
+    script = (
+        "const [resolution, done] = arguments, pen = CanvasRenderingContext2D.prototype;"
+        "const write = pen.fillText, boxes = [];"
+        "pen.fillText = function (text, x, y) {"
+        " const {a, e, f} = this.getTransform(), wide = this.measureText(text).width;"
+        " if (this.font.includes('600')) boxes.push([+text, e + a * x, f + a * y, a * wide]);"
+        " return write.call(this, text, x, y); };"
+        "import('/map.js').then(({map, view}) => {"
+        " view.setResolution(resolution); map.renderSync();"
+        " boxes.length = 0; map.render(); map.once('rendercomplete', () => {"
+        " pen.fillText = write; done(boxes); }); });"
     )
-    assert sparse
+    known = {each["no"] for each in page.state()["obstacles"]}
+    seen = {}
+    for resolution in (0.59, 0.36):
+        drawn = page.driver.execute_async_script(script, resolution)
+        seen[resolution] = {number for number, *_ in drawn}
+        boxes = {number: shapely.box(x, y, x + wide, y + 13.0) for number, x, y, wide in drawn}
+        over = [(a, b) for a, b in combinations(boxes, 2) if boxes[a].intersects(boxes[b])]
+        assert not over, f"at {resolution} m per pixel"
+    assert seen[0.59] < seen[0.36] == known  # a closer look shows them all
 
 
 def test_what_was_dragged_off_the_picture_goes_back(page: Page) -> None:
@@ -717,7 +735,7 @@ def test_edits_to_be_made_by_hand_are_named_until_they_were_read(
     page.button("save")
     page.wait(lambda: "Another program" in page.text("message"))
     page.driver.find_element(By.CSS_SELECTOR, "#message button").click()
-    page.wait(lambda: "1 Ihrer 2 Änderungen" in page.text("message"))
+    page.wait(lambda: "von Ihren Änderungen: 1 von 2" in page.text("message"))
     assert f"von Hand: status: obstacle {first} is not there as it was." in page.text("message")
     page.driver.find_element(By.CSS_SELECTOR, "#message button").click()
     assert page.text("message") == ""
@@ -950,7 +968,23 @@ def test_german_words_and_keys_switched_off(page: Page) -> None:
     page.driver.find_element(By.CSS_SELECTOR, "#language option[value=de]").click()
     page.run("document.getElementById('menu').close()")
     assert page.text("confirm") == "Bestätigen"
-    assert page.run("return document.getElementById('redo').title") == "Vor (Strg+Umschalt+Z)"
+    assert (
+        page.run("return document.getElementById('redo').title") == "Wiederholen (Strg+Umschalt+Z)"
+    )
+    assert page.text("undo") == "Rückgängig"
+    # Nothing is cut off.
+    for width in (360, 1280):
+        page.driver.execute_cdp_cmd(
+            "Emulation.setDeviceMetricsOverride",
+            {"width": width, "height": 860, "deviceScaleFactor": 1, "mobile": False},
+        )
+        narrow = (
+            "return [...document.querySelectorAll('button, h2, label span')]"
+            ".filter(one => one.clientWidth && one.scrollWidth > one.clientWidth)"
+            ".map(one => one.textContent)"
+        )
+        assert page.run(narrow) == []
+    page.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
     lefts = "[...document.querySelectorAll('#settings [name]')].map(one => one.offsetLeft)"
     assert len(set(page.run(f"return {lefts}"))) == 1  # one below the other
     assert page.run("return document.querySelector('[name=last_strip]').value") == "overrun"
@@ -965,7 +999,7 @@ def test_german_words_and_keys_switched_off(page: Page) -> None:
     box.clear()
     box.send_keys("5000", Keys.ENTER)
     page.wait(lambda: "5000 m ist größer als das Feld" in page.text("message"))
-    assert page.text("left") == "Noch ohne Ihr Wort: 21 von 21"
+    assert page.text("left") == "Noch zu prüfen: 21 von 21"
     for name, typed, told in (
         ("spacing_m", "0", "Der Abstand ist eine Zahl in Metern über 0, nicht 0."),
         ("headland_m", "900", "Ein Vorgewende von 900 m lässt nichts vom Feld übrig. Wählen Sie"),
@@ -977,6 +1011,23 @@ def test_german_words_and_keys_switched_off(page: Page) -> None:
         page.wait(lambda told=told: told in page.text("message"))
         box.clear()
         box.send_keys(str(page.state()["settings"][name]))
+    box.clear()
+    box.send_keys("längste Kante", Keys.ENTER)
+    page.wait(lambda: page.state()["settings"]["direction"] == "longest_edge")
+    assert box.get_attribute("value") == "längste Kante"
+
+
+def test_what_a_picture_lacks_is_not_offered(driver: webdriver.Chrome, plan_path: Path) -> None:
+    """A field without a picture had "Near infrared", and two sliders that did nothing."""
+    offered = (
+        "return [...document.querySelectorAll('#view-h ~ label')]"
+        ".filter(one => one.offsetHeight).map(one => one.querySelector('input').id)"
+    )
+    with served(plan_path) as (address, _):
+        assert Page(driver, address).run(offered) == ["opacity", "contrast", "infrared"]
+    (plan_path.parent / "scene.tif").unlink()
+    with served(plan_path) as (address, _):
+        assert Page(driver, address).run(offered) == []
 
 
 def test_the_page_asks_nobody_else(page: Page) -> None:
@@ -1088,7 +1139,7 @@ def test_ground_is_clicked_and_another_outline_chosen(doubtful_path: Path, page:
 
 def test_keys_that_are_faster_than_the_answers_speak_of_one_after_the_other(page: Page) -> None:
     page.press("j")
-    first = page.run("return document.querySelector('#list [aria-current=true]').dataset.no")
+    first = page.run("return document.querySelector('#list [aria-selected=true]').dataset.no")
     page.run(
         "for (const key of ['c', 'r', 'c', ']', ']', ']'])"
         " window.dispatchEvent(new KeyboardEvent('keydown', {key, bubbles: true}));"

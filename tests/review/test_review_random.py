@@ -22,7 +22,7 @@ import('/map.js').then(({sources}) => {
   const shape = one => open(one.getGeometry().getCoordinates());
   done({
     obstacles: drawn('obstacles').map(one => [one.getId(), one.get('status'), shape(one)]),
-    listed: [...document.querySelectorAll('#list button')].map(one => Number(one.dataset.no)),
+    listed: [...document.querySelectorAll('#list li')].map(one => Number(one.dataset.no)),
     outline: drawn('outline').map(shape)[0],
     tracks: drawn('tracks').map(one => [one.get('no'), one.getGeometry().getCoordinates()]),
     notes: id('notes').childElementCount,
@@ -58,7 +58,7 @@ class Hand:
     def drag(self) -> None:
         """From a tree or a corner to wherever, or not so far; keys are pressed meanwhile."""
         state, any_of = self.page.state(), self.random.choice
-        chosen = "return document.querySelector('#list [aria-current=true]')?.dataset.no"
+        chosen = "return document.querySelector('#list [aria-selected=true]')?.dataset.no"
         number = self.page.run(chosen)
         places = [any_of(state["field"]["rings"][0])]
         places += [one["centre"] for one in state["obstacles"] if str(one["no"]) == number] * 3

@@ -101,7 +101,7 @@ def test_a_field_is_reviewed_by_fingers(page: Page) -> None:
         and top + 60 < spot[1] < top + height - 60
     )
     fingers.tap(*spot)
-    chosen = "return document.querySelector('#list [aria-current=true] b')?.textContent"
+    chosen = "return document.querySelector('#list [aria-selected=true] b')?.textContent"
     assert page.run(chosen) == str(number)
     page.button("confirm")
     page.wait(lambda: page.obstacle(number)["status"] == "confirmed")
@@ -139,7 +139,7 @@ def test_two_fingers_zoom_whatever_tool_one_of_them_touches(page: Page) -> None:
     fingers, before = Fingers(page.driver), page.state()
     number = before["obstacles"][10]["no"]
     page.run(f"document.querySelector('#list [data-no=\"{number}\"]').click()")
-    page.wait(lambda: page.run("return document.querySelector('#list [aria-current=true]')"))
+    page.wait(lambda: page.run("return document.querySelector('#list [aria-selected=true]')"))
     spots = [page.obstacle(number)["centre"]] * 3 + [before["field"]["rings"][0][0]]
     for tool, spot in zip(("select", "circle", "direction", "outline"), spots, strict=True):
         page.run(f"document.querySelector('[data-tool={tool}]').click()")
@@ -227,7 +227,7 @@ def test_the_row_that_is_chosen_is_not_below_the_buttons(page: Page, size: tuple
         time.sleep(0.3)
         below, top, panel, bottom = page.run(
             "const box = query => document.querySelector(query).getBoundingClientRect();"
-            "const row = box('#list [aria-current=true]');"
+            "const row = box('#list [aria-selected=true]');"
             "return [box('#verdict').bottom, row.top, box('#panel').bottom, row.bottom];"
         )
         assert below - 1 <= top

@@ -5,7 +5,7 @@ import {keyName, t} from "./web/words.js";
 const KEYS = [
   ["j", "k_next", a => a.next()], ["k", "k_prev", a => a.previous()], ["c", "k_confirm", a => a.confirm()],
   ["r", "k_reject", a => a.reject()], ["u", "k_reset", a => a.reset()], ["a", "k_add", a => a.tool("circle")], ["Enter", "k_here", a => a.here()],
-  ["m", "k_move", a => a.tool("select")], ["[", "k_smaller", a => a.smaller()], ["]", "k_larger", a => a.larger()],
+  ["m", "k_move", a => a.move()], ["[", "k_smaller", a => a.smaller()], ["]", "k_larger", a => a.larger()],
   ["o", "k_outline", a => a.tool("outline")],
   ["g", "k_ground", a => a.tool("ground")], ["x", "k_notground", a => a.tool("notground")], ["Delete", "k_delete", a => a.remove()],
   ["n", "k_onward", a => a.onward()], ["?", "k_help", a => a.help()], ["Escape", "k_esc", a => a.escape()],
@@ -14,6 +14,8 @@ const KEYS = [
 const BRACKETS = ["[", "]"];
 // Held down, these go on; a verdict that was held too long would speak of the next obstacles, too.
 const ON_AND_ON = ["j", "k", ...BRACKETS];
+// From row to row of the list.
+const ROWS = {ArrowUp: -1, ArrowDown: 1, PageUp: -5, PageDown: 5, Home: -Infinity, End: Infinity, ArrowLeft: 0, ArrowRight: 0, Enter: 0, " ": 0};
 const ARROWS = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]};
 
 export function listen(actions) {
@@ -33,6 +35,7 @@ export function listen(actions) {
     if (control && key.toLowerCase() === "z") return done(event.shiftKey ? actions.redo : actions.undo);
     if (control && key.toLowerCase() === "y") return done(actions.redo);
     if (control || (event.altKey && !BRACKETS.includes(key))) return;
+    if (key in ROWS && event.target.matches?.("[role=option]")) return done(() => actions.row(ROWS[key]));
     // Letters are what may be switched off; the map itself has arrows, Enter and Del all the same.
     const onMap = event.target.id === "map";
     if (!document.getElementById("keys-on").checked && key !== "Escape" && !(onMap && key.length > 1)) return;

@@ -1,6 +1,7 @@
 // The page: puts server, map, tools, list and keys together.
 
 import * as api from "./api.js";
+import * as list from "./list.js";
 import * as maps from "./map.js";
 import * as tools from "./tools.js";
 import * as view from "./view.js";
@@ -82,7 +83,7 @@ function show(answer) {
   showList();
   showField();
   for (const input of inputs()) {
-    const value = String(state.settings[input.name]);
+    const value = inWords(state.settings[input.name]);
     // What is typed and was not applied yet stays beside other edits.
     if (input.dataset.shown !== value) input.value = input.dataset.shown = value;
   }
@@ -98,7 +99,7 @@ function show(answer) {
 function showTracks(answer, moving = false) {
   maps.showTracks(answer, moving);
   const f = answer.figures;
-  $("notes").replaceChildren(...answer.notes.map(text => node("li", told(text))));
+  $("notes").replaceChildren(...answer.notes.map(text => list.node("li", told(text))));
   if (f.tracks === undefined) {
     $("figures").replaceChildren();
     $("facts").replaceChildren();
@@ -107,27 +108,25 @@ function showTracks(answer, moving = false) {
   const unfit = f.turns_that_do_not_fit ? ` · ${t("unfit", {n: f.turns_that_do_not_fit})}` : "";
   const waits = answer.route_waits ?? state.settings.route !== "none" ? ` · ${t("route_waits")}` : "";
   $("figures").textContent = `${number(f.area_ha, 2)} ha · ${t(f.tracks === 1 ? "one_track" : "n_tracks", {n: f.tracks})} · ${number(f.length_m / 1000, 2)} km · ${t("covered", {p: number(f.coverage_percent, 1)})}${unfit}${waits}`;
-  const facts = [["area", `${number(f.area_ha, 4)} ha`], ["length", `${f.tracks}, ${number(f.length_m)} m`], ["segments", number(f.segments)],
+  const facts = [["area", `${number(f.area_ha, 4)} ha`], ["length", `${f.tracks} · ${number(f.length_m)} m`], ["segments", number(f.segments)],
     ["coverage", `${number(f.coverage_percent, 1)} %`], ["overlap", `${number(f.overlap_percent, 1)} %`],
     ["heading", heading(f.heading_deg)], ["lost_all", `${number(f.lost_m)} m`]];
   if (f.turns !== null) facts.push(["turns", number(f.turns)]);
-  $("facts").replaceChildren(...facts.flatMap(([name, value]) => [node("dt", t(name)), node("dd", value)]));
+  $("facts").replaceChildren(...facts.flatMap(([name, value]) => [list.node("dt", t(name)), list.node("dd", value)]));
 }
-
-const node = (tag, text) => Object.assign(document.createElement(tag), {textContent: text});
 
 function showField() {
   const field = state.field;
   $("certainty").textContent = field.certainty !== null ? t("sure", {p: number(100 * field.certainty)})
     : t(["drawn", "boundary", "chosen"].includes(field.method) ? field.method : "unknown");
   const doubts = [...field.doubts, ...state.doubts].map(told);
-  $("doubts").replaceChildren(...doubts.map(text => node("li", text)));
+  $("doubts").replaceChildren(...doubts.map(text => list.node("li", text)));
   const shown = JSON.stringify(field.rings);
   const choice = field.alternatives.some(other => JSON.stringify(other.rings) !== shown) ? field.alternatives : [];
   const focused = [...$("alternatives").querySelectorAll("button")].indexOf(document.activeElement);
   $("alternatives").replaceChildren(...choice.map((other, i) => {
     const item = document.createElement("li");
-    const press = node("button", t("outline_no", {n: i + 1, p: number(100 * other.certainty)}));
+    const press = list.node("button", t("outline_no", {n: i + 1, p: number(100 * other.certainty)}));
     press.setAttribute("aria-pressed", String(JSON.stringify(other.rings) === shown));
     press.onclick = () => commit({do: "choose", no: i + 1});
     press.onmouseenter = () => maps.showOther(other.rings);
@@ -148,27 +147,14 @@ function ordered() {
 function showList() {
   const all = state.obstacles.length, left = state.obstacles.filter(waits).length;
   $("left").textContent = !all ? t(state.detected_from === null ? "unsearched" : "no_obstacles") : t("left", {n: left, all});
-  const focused = document.activeElement?.dataset?.no;
-  $("list").replaceChildren(...ordered().map(each => {
-    const item = document.createElement("li"), press = document.createElement("button");
-    press.dataset.no = each.no;
-    const size = each.radius_m === null ? t("other") : t("radius", {m: number(each.radius_m, 1)});
-    const sure = each.confidence === null ? "" : ` · ${number(100 * each.confidence)} %`;
-    const cost = each.lost_m ? ` · ${t("lost", {m: number(each.lost_m)})}` : "";
-    press.append(node("b", each.no), node("span", t(each.status)), node("small", `${size}${sure}${cost}`));
-    press.onclick = () => inTurn(() => row(each.no) && choose(each.no, true));
-    item.append(press);
-    return item;
-  }));
-  if (focused) $("list").querySelector(`[data-no="${focused}"]`)?.focus();
+  const focused = list.focused();
+  list.fill(ordered(), no => inTurn(() => row(no) && choose(no, true)));
   for (const name of ["previous", "next"]) able(name, all > 0);
-  showChosen();
+  showChosen(focused);
 }
 
-function showChosen() {
-  for (const press of $("list").querySelectorAll("button"))
-    press.setAttribute("aria-current", String(Number(press.dataset.no) === chosen));
-  $("list").querySelector('[aria-current="true"]')?.scrollIntoView({block: "nearest"});
+function showChosen(focused) {
+  list.mark(chosen, focused);
   for (const name of ["confirm", "reject"]) able(name, chosen !== null);
 }
 
@@ -179,7 +165,7 @@ function choose(no, zoom) {
   maps.showHandle(no === null ? null : row(no));
   if (no === null) return;
   if (zoom) maps.zoomTo(row(no));
-  speak(named(row(no)));
+  if (!list.focused()) speak(named(row(no)));  // else the row is read that has the focus
 }
 
 function step(forth) {
@@ -264,12 +250,16 @@ function resize(factor) {
 
 const inputs = () => [...$("settings").elements].filter(input => input.name);
 
+// A direction that has a name is shown in the language of the page, and may be typed in either.
+const inWords = value => state.directions.includes(value) ? t(value) : String(value);
+const direction = text => state.directions.find(each => t(each) === text) ?? text;
+
 // Settings as they are typed where they are others.
 function typed() {
   const given = {};
   for (const {name, value} of inputs()) {
     const before = state.settings[name], text = plain(value.trim());
-    const meant = typeof before === "number" && /^[-+]?(\d+\.?\d*|\.\d+)$/.test(text) ? Number(text) : text;
+    const meant = typeof before === "number" && /^[-+]?(\d+\.?\d*|\.\d+)$/.test(text) ? Number(text) : name === "direction" ? direction(text) : text;
     if (String(meant) !== String(before)) given[name] = meant;
   }
   return given;
@@ -297,7 +287,8 @@ const ACTIONS = {
   confirm: () => inTurn(() => verdict("confirmed")), reject: () => inTurn(() => verdict("rejected")),
   reset: () => inTurn(takeBack), undo: () => through("undo"), redo: () => through("redo"), save: () => save(),
   help: () => $("keys").showModal(), more: () => $("menu").showModal(), smaller: () => inTurn(() => resize(1 / 1.1)), larger: () => inTurn(() => resize(1.1)),
-  remove: () => tools.removeCorner() || ifChosen(no => make({do: "delete", no})), tool: name => { tools.use(name); speak(t(`t_${name}`)); }, here: tools.clickHere, nudge,
+  remove: () => tools.removeCorner() || ifChosen(no => make({do: "delete", no})), tool: name => { tools.use(name); speak(t(`t_${name}`)); }, here: tools.clickHere, nudge, row: by => inTurn(() => list.focused() && choose(list.away(by), true)),
+  move: () => { ACTIONS.tool("select"); $("map").focus(); },
   busy: () => undone > 0, onward: () => goTo((state.plan + 1) % state.plans.length),
   escape: () => { if (tools.current() === "select") inTurn(() => choose(null)); tools.use("select"); },
 };
@@ -312,11 +303,11 @@ async function goTo(plan) {
 
 function toolButtons() {
   $("tools").replaceChildren(...tools.TOOLS.map(name => {
-    const press = node("button", t(`t_${name}`));
+    const press = list.node("button", t(`t_${name}`));
     press.dataset.tool = name;
     press.onclick = () => tools.use(name);
     return press;
-  }), Object.assign(node("button", t("t_delete")), {id: "remove", onclick: ACTIONS.remove}));
+  }), Object.assign(list.node("button", t("t_delete")), {id: "remove", onclick: ACTIONS.remove}));
   pressed();
 }
 
@@ -329,6 +320,7 @@ function words() {
   label();
   toolButtons();
   keyTable($("key-table"));
+  $("directions").replaceChildren(...state.directions.map(name => new Option(inWords(name))));
   $("legend").replaceChildren(...legend());
 }
 
@@ -345,7 +337,6 @@ async function start() {
   listen(ACTIONS);
   view.begin(state);
   $("credit").textContent = state.picture?.credit ?? "";
-  $("directions").replaceChildren(...state.directions.map(name => new Option(name)));
   $("export-format").replaceChildren(...state.formats.map(([name, title]) => new Option(title, name)));
   $("language").value = currentLanguage();
   $("plans-row").hidden = state.plans.length < 2;

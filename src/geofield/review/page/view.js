@@ -11,6 +11,7 @@ const SHOWN = {
 
 export function begin(state) {
   document.getElementById("infrared-row").hidden = !state.picture?.infrared;
+  for (const row of document.querySelectorAll(".of-picture")) row.hidden = !state.picture;
   for (const [name, show] of Object.entries(SHOWN)) {
     const control = document.getElementById(name);
     const [what, usual] = control.type === "checkbox" ? ["checked", control.defaultChecked] : ["value", control.defaultValue];
