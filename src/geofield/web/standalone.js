@@ -21,7 +21,7 @@ const add = (features, style, name, declutter = false) => {
 };
 const field = plan.field;
 const shown = {
-  tracks: add(trackFeatures(plan.tracks), trackStyle, "track"),
+  tracks: add(trackFeatures(plan.tracks), trackStyle, "track", true),
   headland: add(plan.headland.map(xy => line(xy)), cased(plan.theme.headland, 1.6), "headland"),
   gaps: add(gapFeatures(plan.gaps), gapStyle(), "gap"),
   turns: add(plan.route.map(turn => line(turn.line, {fits: turn.fits})), turnStyle, "turn"),

@@ -23,7 +23,7 @@ export function build(state, chosen) {
     source: tiles(state, "colour", projection)}));
   const add = (name, style, more = {}) => layers.push(new ol.layer.Vector({source: sources[name], style, ...more,
     updateWhileInteracting: true, updateWhileAnimating: true}));
-  add("tracks", symbols.trackStyle);
+  add("tracks", symbols.trackStyle, {declutter: true});
   add("headland", symbols.cased(state.theme.headland, 1.6));
   add("gaps", symbols.gapStyle());
   add("turns", symbols.turnStyle);
