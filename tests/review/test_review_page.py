@@ -982,10 +982,10 @@ def test_german_words_and_keys_switched_off(page: Page) -> None:
     )
     assert page.text("undo") == "Rückgängig"
     # Nothing is cut off.
-    for width in (360, 1280):
+    for width, height in ((360, 860), (720, 450), (1280, 860)):  # 720: a page enlarged twice
         page.driver.execute_cdp_cmd(
             "Emulation.setDeviceMetricsOverride",
-            {"width": width, "height": 860, "deviceScaleFactor": 1, "mobile": False},
+            {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False},
         )
         narrow = (
             "return [...document.querySelectorAll('button, h2, label span')]"

@@ -67,7 +67,7 @@ const WORDS = {
     dominant: "wie der meiste Rand", longest_edge: "längste Kante", hough: "Linien nach Hough", fewest: "wenigste Spuren", fewest_turns: "wenigste Wendungen",
     onward: "Nächstes Feld", k_onward: "Nächstes Feld oder nächster Plan, wenn es mehrere sind",
     v_overrun: "über den Rand", v_leave: "auslassen", v_shift: "hineinrücken", v_spread: "Abstand anpassen",
-    v_none: "keiner", v_boustrophedon: "Spur für Spur", v_skip: "mit ausgelassenen Spuren", v_shortest: "kürzester",
+    v_none: "keiner", v_boustrophedon: "Spur für Spur", v_skip: "mit Auslassen", v_shortest: "kürzester",
     outline_no: "Grenze {n} · {p} %", alternatives: "Andere Feldgrenzen", k_arrows: "Gewähltes Hindernis oder gewählte Ecke um 0,5 m verschieben (Umschalt: 0,1 m), sonst die Karte; in der Liste von Zeile zu Zeile",
     corner: "Ecke {n} von {all}", undone: "Rückgängig gemacht", redone: "Wiederholt", deleted: "gelöscht", k_here: "Wenn die Karte den Fokus hat: ein Klick in ihre Mitte; für eine Fläche Ecke um Ecke, die letzte zweimal",
     Ctrl: "Strg", Shift: "Umschalt", Delete: "Entf", k_delete: "Löschen", k_undo: "Rückgängig", k_redo: "Wiederholen", k_save: "Speichern", k_help: "Diese Liste", k_esc: "Abbrechen",
