@@ -345,7 +345,7 @@ def test_tiles_that_never_come_whole_are_counted_as_failed(tmp_path: Path) -> No
     with serving(always) as server, pytest.raises(ImageryError) as caught:
         acquire(_named(server), _WIDE, tmp_path / "a.tif", options=options)
     assert "not a picture (text/html) 3 times" in str(caught.value)
-    assert "0 are not there" in str(caught.value)
+    assert "(0 not there, " in str(caught.value)
 
 
 def test_a_tile_that_says_it_is_enormous_is_a_broken_one() -> None:
