@@ -20,7 +20,7 @@ from geofield.formats.qgis.layer_style import frame_strip
 from geofield.imagery import write_scene
 from geofield.model.field import FieldQuality
 from geofield.model.frame import along_frame, shown_ground
-from geofield.model.map_words import frame_lines
+from geofield.model.map_words import figures_in_words, frame_lines
 from geofield.pipeline import run_tracks
 from geofield.plan import Plan, read_plan
 from geofield.review.live import LivePlans
@@ -100,6 +100,27 @@ def test_an_outline_within_the_picture_is_in_no_such_doubt(simulated: SimulatedF
     assert Plan(field, grid=grid).doubts == ()
     doubted = replace(field, quality=FieldQuality(0.4, ("borders are weak",), (), False))
     assert Plan(doubted, grid=grid).doubts == ("borders are weak",)
+
+
+@pytest.mark.parametrize("how", ["study", "boundary"])
+def test_how_certain_an_outline_is_that_nobody_measured_is_not_told(
+    sample: Path, tmp_path: Path, how: str
+) -> None:
+    """It was "100% certain", of method study also along three quarters of the picture's edge."""
+    where = ("--boundary", sample / "field_1.gpkg", "--boundary-layer", "field")
+    if how == "study":
+        where = ("--lat", "35.075373", "--lon", "33.531142", "--method", "study")
+    _called("run", sample / "field_1.tif", *where, "--spacing", 6, "--out", tmp_path / "out")
+    file = tmp_path / "out" / "field.gpkg"
+    assert gpd.read_file(file, layer="field")["certainty"].isna().all()
+    report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+    assert report["field"]["certainty"] is None
+    plan = read_plan(file)
+    assert plan.field.certainty is None
+    assert field_of(plan)["certainty"] is None
+    assert "certain" not in figures_in_words(plan.to_dataset())[0]
+    told = _called("field", sample / "field_1.tif", *where, "-o", tmp_path / "field.gpkg").stderr
+    assert "Trust      not measured" in told
 
 
 def test_a_drawn_outline_at_the_frame_is_told_too(simulated: SimulatedField) -> None:

@@ -208,7 +208,8 @@ def _say(plan: Plan, output: Path, *, alternatives: bool) -> None:
         f"{len(found.polygon.exterior.coords) - 1} corners ({found.method})"
     )
     if found.quality is not None:
-        say(f"Trust      {found.quality.score:.0%}")
+        certain = found.certainty
+        say(f"Trust      {'not measured' if certain is None else f'{certain:.0%}'}")
         for reason in found.quality.reasons:
             say(f"           {reason}")
     if alternatives and not found.alternatives:

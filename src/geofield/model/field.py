@@ -77,6 +77,11 @@ class FieldQuality:
     figures: tuple[tuple[str, float], ...] = ()
     trusted: bool = True
 
+    @property
+    def certainty(self) -> float | None:
+        """The probability that the outline is right, 0 to 1; None where nobody measured it."""
+        return self.score if "certainty" in dict(self.figures) else None
+
 
 @dataclass(frozen=True, slots=True)
 class Alternative:
@@ -206,8 +211,8 @@ class Field:
 
     @property
     def certainty(self) -> float | None:
-        """The probability that the outline is right, 0 to 1; None where nobody measured it."""
-        return None if self.quality is None else self.quality.score
+        """As `FieldQuality.certainty`: None of a parcel of one's own, and by method ``study``."""
+        return None if self.quality is None else self.quality.certainty
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -228,7 +233,8 @@ class Field:
             "CRS": authority_name(self.crs),
         }
         if self.quality is not None:
-            facts["certainty"] = f"{self.quality.score:.2f}"
+            if self.certainty is not None:
+                facts["certainty"] = f"{self.certainty:.2f}"
             facts["doubts"] = str(len(self.quality.reasons))
         return facts
 

@@ -51,11 +51,10 @@ def field_of(plan: Plan) -> dict[str, Any]:
     """The outline; of a person's own nothing is in doubt but where the picture ends."""
     field = plan.field
     method = "drawn" if plan.outline_edited else field.method
-    quality = None if method in ("drawn", "boundary", "chosen") else field.quality
     shown = outline_view(
         field.polygon,
         method=method,
-        certainty=None if quality is None else quality.score,
+        certainty=None if plan.outline_edited else field.certainty,
         doubts=plan.doubts,
         frame=plan.frame_lines,
     )
