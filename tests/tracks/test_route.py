@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 from unittest.mock import patch
 
@@ -165,11 +166,12 @@ def test_a_whole_number_of_tracks_may_be_written_with_a_point() -> None:
     assert far.route is not None
 
 
-def test_start_chooses_the_corner() -> None:
+@pytest.mark.parametrize("pattern", ["boustrophedon", "skip", "shortest"])
+def test_start_chooses_the_corner(pattern: Any) -> None:
     plain = shapely.box(500000, 5600000, 500300, 5600200)
-    tracks = plan_tracks(plain, crs=CRS, spacing_m=6.0)
+    tracks = plan_tracks(plain, crs="EPSG:32633", spacing_m=6.0)
     for corner in ((500000, 5600000), (500300, 5600000), (500300, 5600200), (500000, 5600200)):
-        route = plan_route(tracks, start=corner).route
+        route = plan_route(tracks, start=corner, pattern=pattern).route
         assert route is not None
         first = shapely.get_coordinates(route.geometry.iloc[0])[0]
         assert np.hypot(*(first - corner)) < 6.0
@@ -383,3 +385,31 @@ def test_a_track_is_left_early_and_joined_late_where_a_tree_is_too_near(radius_m
         turn, _, _ = past_a_tree(radius_m, before_m=0.5, spare_m=spare_m)
         assert max(turn.early_m, turn.late_m) <= spare_m
         assert turn.fits == (turn.early_m > 0)
+
+
+@pytest.mark.parametrize(("bend_m", "fits"), [(1.0, "no"), (12.0, "yes"), (20.0, "yes")])
+def test_a_turn_past_a_tree_meets_segments_that_a_person_bent(bend_m: float, fits: str) -> None:
+    """It "fitted", and ended 4 m beside the work, at 36 degrees to it."""
+    tree = shapely.Point(500015.5, 5300080).buffer(4)
+    field = shapely.box(500000, 5300000, 500040, 5300160)
+    plan = plan_tracks(field, [tree], crs=CRS, spacing_m=10.0, direction=0.0)
+    bent = []
+    for line in plan.segments.geometry:
+        ends = shapely.get_coordinates(line)
+        near = line.project(shapely.Point(500015, 5300080))
+        at = abs(near - bend_m) if near > 0 else bend_m
+        middle = line.interpolate(at) if line.length < 100 else line.centroid
+        bent.append(shapely.LineString([ends[0], (middle.x + 2.5, middle.y), ends[1]]))
+    segments = plan.segments.set_geometry(bent, crs=plan.segments.crs)
+    route = plan_route(replace(plan, segments=segments), turning_radius_m=6.0, margin_m=30.0)
+    assert route.route is not None
+    assert route.turns is not None
+    (past,) = np.flatnonzero(route.turns["from_track"] == route.turns["to_track"])
+    shapes = route.route.geometry.iloc[2 * past : 2 * past + 3]
+    (before, way, after) = (shapely.get_coordinates(each) for each in shapes)
+    np.testing.assert_allclose(way[[0, -1]], [before[-1], after[0]], atol=1e-6)
+    assert route.turns["fits"].iloc[past] == fits
+    if fits == "yes":
+        for joint in ((before[-2:], way[:2]), (way[-2:], after[:2])):
+            one, other = (np.arctan2(*np.diff(each, axis=0)[0]) for each in joint)
+            assert abs(one - other) < 0.06

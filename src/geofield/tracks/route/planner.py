@@ -118,7 +118,7 @@ def plan_route(
             passage,
             radius_m=turning_radius_m,
             curve=curve,
-            spare_m=_spare(shapely.length(lines[rows]) / scale, track_no[rows], backward),
+            spare_m=_spare(lines[rows], legs[rows], track_no[rows], backward) / scale,
         )
     route, table = _tables(
         tracks, rows, backward, turns, exits=exits, entries=entries, radius_m=turning_radius_m
@@ -171,11 +171,10 @@ def _ends(lines: NDArray[np.object_]) -> FloatArray:
 
 
 def _legs(lines: NDArray[np.object_]) -> FloatArray:
-    """Directions in which each line begins and ends, radians; a person may have bent one."""
+    """First and last straight piece of each line, (lines, 2, 2); a person may have bent one."""
     beside = np.stack([shapely.get_coordinates(shapely.get_point(lines, at)) for at in (1, -2)], 1)
     ends = _ends(lines)
-    first, last = beside[:, 0] - ends[:, 0], ends[:, 1] - beside[:, 1]
-    return np.column_stack([np.arctan2(each[:, 1], each[:, 0]) for each in (first, last)])
+    return np.stack((beside[:, 0] - ends[:, 0], ends[:, 1] - beside[:, 1]), axis=1)
 
 
 def _poses(
@@ -184,17 +183,25 @@ def _poses(
     """Poses at which one segment is left and the next is entered."""
     # Driven backward, a line begins at its end, and the other way round.
     ends = np.where(backward[:, None, None], ends[:, ::-1], ends)
-    legs = np.where(backward[:, None], legs[:, ::-1] + np.pi, legs)
-    exits = np.column_stack((ends[:, 1], legs[:, 1]))[:-1]
-    entries = np.column_stack((ends[:, 0], legs[:, 0]))[1:]
+    way = np.arctan2(legs[..., 1], legs[..., 0])
+    way = np.where(backward[:, None], way[:, ::-1] + np.pi, way)
+    exits = np.column_stack((ends[:, 1], way[:, 1]))[:-1]
+    entries = np.column_stack((ends[:, 0], way[:, 0]))[1:]
     return exits, entries
 
 
-def _spare(length_m: FloatArray, track_no: IntArray, backward: NDArray[np.bool_]) -> FloatArray:
-    """What may be left out of the segments before and after each turn along one track."""
-    length = length_m * _SPARE_SHARE
+def _spare(
+    lines: NDArray[np.object_], legs: FloatArray, track_no: IntArray, backward: NDArray[np.bool_]
+) -> FloatArray:
+    """What may be left out of the segments before and after each turn along one track.
+
+    Where a person bent a segment, it is left and joined on its straight pieces at the ends.
+    """
+    share = _SPARE_SHARE * shapely.length(lines)
+    spare = np.minimum(share[:, None], np.hypot(legs[..., 0], legs[..., 1]))
+    spare = np.where(backward[:, None], spare[:, ::-1], spare)
     same = (track_no[1:] == track_no[:-1]) & (backward[1:] == backward[:-1])
-    return np.asarray(np.column_stack((length[:-1], length[1:])) * same[:, None])
+    return np.asarray(np.column_stack((spare[:-1, 1], spare[1:, 0])) * same[:, None])
 
 
 def _tables(

@@ -39,9 +39,9 @@ def shortest_order(
 ) -> tuple[IntArray, NDArray[np.bool_]]:
     """Shorten the drive between segments; the new `rows` and `backward`.
 
-    `ends` are both ends of each segment (segments, 2, 2) in the CRS, `rows` and `backward` the
-    order to begin with; `radius_m` is for the cost of turning round, `start` where the machine
-    comes from.
+    `ends` are both ends of each segment (segments, 2, 2), metres on the ground, `rows` and
+    `backward` the order to begin with; `radius_m` is for the cost of turning round, `start` where
+    the machine comes from.
     """
     count = len(ends)
     if count < 2:

@@ -219,7 +219,7 @@ def _lane_change(
 ) -> Turn | None:
     """Leave the track before the obstacle, pass beside it, join the track behind it."""
     radius_m, forwards = machine.radius_m, replace(machine, curve="dubins")
-    ahead = np.array([np.cos(start[2]), np.sin(start[2])])
+    ahead, onward = (np.array([np.cos(each[2]), np.sin(each[2])]) for each in (start, goal))
     left = np.array([-ahead[1], ahead[0]])
     along, across = (way - way[0]) @ ahead, (way - way[0]) @ left
     side = 1.0 if across.max() > -across.min() else -1.0
@@ -243,7 +243,7 @@ def _lane_change(
                 [*(start[:2] - early * ahead), start[2]],
                 [*(start[:2] + first * ahead + side * aside * left), start[2]],
                 [*(start[:2] + last * ahead + side * aside * left), start[2]],
-                [*(goal[:2] + late * ahead), start[2]],
+                [*(goal[:2] + late * onward), goal[2]],
             ]
         )
         turn = _through(poses, forwards)
