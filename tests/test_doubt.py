@@ -107,7 +107,7 @@ def test_how_certain_an_outline_is_that_nobody_measured_is_not_told(
     sample: Path, tmp_path: Path, how: str
 ) -> None:
     """It was "100% certain", of method study also along three quarters of the picture's edge."""
-    where = ("--boundary", sample / "field_1.gpkg", "--boundary-layer", "field")
+    where: tuple[object, ...] = ("--boundary", sample / "field_1.gpkg", "--boundary-layer", "field")
     if how == "study":
         where = ("--lat", "35.075373", "--lon", "33.531142", "--method", "study")
     _called("run", sample / "field_1.tif", *where, "--spacing", 6, "--out", tmp_path / "out")
