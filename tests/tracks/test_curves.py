@@ -37,6 +37,22 @@ def test_reeds_shepp_is_the_same_both_ways(pairs: tuple[np.ndarray, np.ndarray])
     assert np.abs(there - back).max() < 1e-9
 
 
+def test_the_tightest_lane_change_is_two_arcs_that_touch() -> None:
+    """Rounding took half of them for none: Dubins' curve was a loop then, and did not fit."""
+    rng, radius_m = np.random.default_rng(1), 5.0
+    aside = rng.uniform(0.5, 9.8, 500)
+    along, side = np.sqrt(aside * (4.0 * radius_m - aside)), rng.choice([-1.0, 1.0], 500)
+    place, angle = rng.uniform(4.8e6, 4.9e6, (500, 2)), rng.uniform(-np.pi, np.pi, 500)
+    ahead = np.column_stack((np.cos(angle), np.sin(angle)))
+    left = ahead[:, ::-1] * (-1.0, 1.0)
+    start = np.column_stack((place, angle))
+    goal = np.column_stack((place + along[:, None] * ahead + (side * aside)[:, None] * left, angle))
+    two_arcs = 2.0 * np.arccos(1.0 - aside / (2.0 * radius_m))
+    for words in (dubins_words, reeds_shepp_words):
+        shortest = words(start, goal, radius_m).total.min(axis=1)
+        np.testing.assert_allclose(shortest, two_arcs, atol=1e-4)
+
+
 #: Steer and sign of each piece of the drives of Reeds and Shepp's nine families, those that are
 #: driven from the other end left out, and of Dubins' three: `q` is a quarter circle, `u` are arcs
 #: as long as each other, `w` is more than half a circle.

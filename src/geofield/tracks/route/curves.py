@@ -17,6 +17,7 @@ from geofield.tracks.frame import FloatArray
 LEFT, STRAIGHT, RIGHT = 1, 0, -1
 _TWO_PI = 2.0 * np.pi
 _MATCH = 1e-6
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +90,15 @@ def to_unit(
     return dx * cos + dy * sin, dy * cos - dx * sin, goal[:, 2] - start[:, 2]
 
 
+def touching(value: FloatArray, low: float, high: float) -> FloatArray:
+    """A value that lies beyond a bound by rounding alone, at it.
+
+    There arcs touch, as those of the tightest lane change: without it half of such words are none.
+    """
+    near = (value > low - _ROUNDING) & (value < high + _ROUNDING)
+    return np.where(near, np.clip(value, low, high), value)
+
+
 def trace(
     start: FloatArray,
     steer: NDArray[np.int8],
@@ -128,22 +138,26 @@ def dubins_words(start: FloatArray, goal: FloatArray, radius_m: float) -> Words:
     a, b = -theta % _TWO_PI, (angle - theta) % _TWO_PI
     sa, sb, ca, cb, cab = np.sin(a), np.sin(b), np.cos(a), np.cos(b), np.cos(a - b)
     with np.errstate(invalid="ignore"):
-        p_lsl = np.sqrt(2.0 + d * d - 2.0 * cab + 2.0 * d * (sa - sb))
+        p_lsl = np.sqrt(touching(2.0 + d * d - 2.0 * cab + 2.0 * d * (sa - sb), 0.0, np.inf))
         w = np.arctan2(cb - ca, d + sa - sb)
         lsl = (_round(w - a), p_lsl, _round(b - w))
-        p_rsr = np.sqrt(2.0 + d * d - 2.0 * cab + 2.0 * d * (sb - sa))
+        p_rsr = np.sqrt(touching(2.0 + d * d - 2.0 * cab + 2.0 * d * (sb - sa), 0.0, np.inf))
         w = np.arctan2(ca - cb, d - sa + sb)
         rsr = (_round(a - w), p_rsr, _round(w - b))
-        p_lsr = np.sqrt(d * d - 2.0 + 2.0 * cab + 2.0 * d * (sa + sb))
+        p_lsr = np.sqrt(touching(d * d - 2.0 + 2.0 * cab + 2.0 * d * (sa + sb), 0.0, np.inf))
         w = np.arctan2(-ca - cb, d + sa + sb) - np.arctan2(-2.0, p_lsr)
         lsr = (_round(w - a), p_lsr, _round(w - b))
-        p_rsl = np.sqrt(d * d - 2.0 + 2.0 * cab - 2.0 * d * (sa + sb))
+        p_rsl = np.sqrt(touching(d * d - 2.0 + 2.0 * cab - 2.0 * d * (sa + sb), 0.0, np.inf))
         w = np.arctan2(ca + cb, d - sa - sb) - np.arctan2(2.0, p_rsl)
         rsl = (_round(a - w), p_rsl, _round(b - w))
-        p_rlr = _round(-np.arccos((6.0 - d * d + 2.0 * cab + 2.0 * d * (sa - sb)) / 8.0))
+        p_rlr = _round(
+            -np.arccos(touching((6.0 - d * d + 2.0 * cab + 2.0 * d * (sa - sb)) / 8.0, -1.0, 1.0))
+        )
         t = _round(a - np.arctan2(ca - cb, d - sa + sb) + p_rlr / 2.0)
         rlr = (t, p_rlr, _round(a - b - t + p_rlr))
-        p_lrl = _round(-np.arccos((6.0 - d * d + 2.0 * cab + 2.0 * d * (sb - sa)) / 8.0))
+        p_lrl = _round(
+            -np.arccos(touching((6.0 - d * d + 2.0 * cab + 2.0 * d * (sb - sa)) / 8.0, -1.0, 1.0))
+        )
         t = _round(-a - np.arctan2(ca - cb, d + sa - sb) + p_lrl / 2.0)
         lrl = (t, p_lrl, _round(b - a - t + p_lrl))
     length = np.stack(

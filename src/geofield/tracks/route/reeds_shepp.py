@@ -12,7 +12,15 @@ from collections.abc import Callable
 import numpy as np
 
 from geofield.tracks.frame import FloatArray
-from geofield.tracks.route.curves import LEFT, RIGHT, STRAIGHT, Words, keep_joining, to_unit
+from geofield.tracks.route.curves import (
+    LEFT,
+    RIGHT,
+    STRAIGHT,
+    Words,
+    keep_joining,
+    to_unit,
+    touching,
+)
 
 _HALF_PI = np.pi / 2.0
 _Family = Callable[[FloatArray, FloatArray, FloatArray], list[FloatArray]]
@@ -76,35 +84,35 @@ def _lsl(x: FloatArray, y: FloatArray, phi: FloatArray) -> list[FloatArray]:
 
 def _lsr(x: FloatArray, y: FloatArray, phi: FloatArray) -> list[FloatArray]:
     u1, t1 = _polar(x + np.sin(phi), y - 1.0 - np.cos(phi))
-    u = np.sqrt(u1 * u1 - 4.0)
+    u = np.sqrt(touching(u1 * u1 - 4.0, 0.0, np.inf))
     t = _wrap(t1 + np.arctan2(2.0, u))
     return [t, u, _wrap(t - phi)]
 
 
 def _lrl(x: FloatArray, y: FloatArray, phi: FloatArray) -> list[FloatArray]:
     u1, theta = _polar(x - np.sin(phi), y - 1.0 + np.cos(phi))
-    u = -2.0 * np.arcsin(u1 / 4.0)
+    u = -2.0 * np.arcsin(touching(u1 / 4.0, -1.0, 1.0))
     t = _wrap(theta + u / 2.0 + np.pi)
     return [t, u, _wrap(phi - t + u)]
 
 
 def _lrlr_inner_opposite(x: FloatArray, y: FloatArray, phi: FloatArray) -> list[FloatArray]:
     xi, eta = x + np.sin(phi), y - 1.0 - np.cos(phi)
-    u = np.arccos((2.0 + np.hypot(xi, eta)) / 4.0)
+    u = np.arccos(touching((2.0 + np.hypot(xi, eta)) / 4.0, -1.0, 1.0))
     t, v = _tau_omega(u, -u, xi, eta, phi)
     return [t, u, -u, v]
 
 
 def _lrlr_inner_same(x: FloatArray, y: FloatArray, phi: FloatArray) -> list[FloatArray]:
     xi, eta = x + np.sin(phi), y - 1.0 - np.cos(phi)
-    u = -np.arccos((20.0 - xi * xi - eta * eta) / 16.0)
+    u = -np.arccos(touching((20.0 - xi * xi - eta * eta) / 16.0, -1.0, 1.0))
     t, v = _tau_omega(u, u, xi, eta, phi)
     return [t, u, u, v]
 
 
 def _lrsl(x: FloatArray, y: FloatArray, phi: FloatArray) -> list[FloatArray]:
     rho, theta = _polar(x - np.sin(phi), y - 1.0 + np.cos(phi))
-    r = np.sqrt(rho * rho - 4.0)
+    r = np.sqrt(touching(rho * rho - 4.0, 0.0, np.inf))
     t = _wrap(theta + np.arctan2(r, -2.0))
     return [t, np.full_like(t, -_HALF_PI), 2.0 - r, _wrap(phi - _HALF_PI - t)]
 
@@ -118,7 +126,7 @@ def _lrsr(x: FloatArray, y: FloatArray, phi: FloatArray) -> list[FloatArray]:
 def _lrslr(x: FloatArray, y: FloatArray, phi: FloatArray) -> list[FloatArray]:
     xi, eta = x + np.sin(phi), y - 1.0 - np.cos(phi)
     rho = np.hypot(xi, eta)
-    u = 4.0 - np.sqrt(rho * rho - 4.0)
+    u = 4.0 - np.sqrt(touching(rho * rho - 4.0, 0.0, np.inf))
     t = _wrap(np.arctan2((4.0 - u) * xi - 2.0 * eta, -2.0 * xi + (u - 4.0) * eta))
     quarter = np.full_like(t, -_HALF_PI)
     return [t, quarter, u, quarter, _wrap(t - phi)]
