@@ -388,7 +388,7 @@ def test_simulated_trees_without_room_are_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert geofield("simulate", "--size", 64, "--trees", 500, "--out", tmp_path / "sim") == 0
-    assert "Not all 500 trees have room" in capsys.readouterr().err
+    assert "Not every field has room for 500 trees" in capsys.readouterr().err
 
 
 def test_a_mistyped_command_gets_a_suggestion(capsys: pytest.CaptureFixture[str]) -> None:

@@ -48,7 +48,7 @@ def test_two_plans_in_a_folder_are_not_one(linked):
     (linked / "tracks.rdf").rename(linked / "north_tracks.rdf")
     done = geofield("import", linked, "-o", linked / "a.gpkg")
     assert done.returncode == 1
-    assert "holds 3 RDF/XML" in done.stderr
+    assert "holds 3 files (RDF/XML" in done.stderr
 
 
 @pytest.mark.filterwarnings("ignore:.*cannot carry:geofield.errors.FormatWarning")

@@ -269,9 +269,9 @@ def test_water_buildings_roads_headings_and_pivots_of_other_programs(tmp_path, t
     found = json.loads(done.stdout)
     assert found["rows"] == {"field": 1, "obstacles": 3, "tracks": 2, "segments": 2}
     for words in (
-        "1 of type water",
-        "1 of type building",
-        "1 of type road",
+        "1 polygon of type water",
+        "1 polygon of type building",
+        "1 polygon of type road",
         "1 polygon left out: treatment zone",
         "an A+ line",
         "a pivot of 30.0 m",

@@ -89,8 +89,8 @@ def test_an_area_and_missing_tiles(tmp_path: Path, capsys: pytest.CaptureFixture
         assert "--missing mask" in capsys.readouterr().err
         assert not Path("a.tif").exists()
         assert run(*arguments, "--missing", "mask", "--log", "a.log") == 0
-        assert "are no-data in the picture" in capsys.readouterr().err
-        assert "are no-data in the picture" in Path("a.log").read_text()
+        assert "1 tile could not be had: no-data in the picture" in capsys.readouterr().err
+        assert "1 tile could not be had: no-data in the picture" in Path("a.log").read_text()
     with rasterio.open("a.tif") as file:
         assert not file.dataset_mask().all()
         west, south, east, north = rasterio.warp.transform_bounds(file.crs, 4326, *file.bounds)
