@@ -30,10 +30,12 @@ class Daskers:
         self.folder = folder
         self.file = folder / "scheduler.json"
         self.scheduler = self.start("scheduler", "--port", "0", "--scheduler-file", self.file)
-        until = time.monotonic() + 120
-        while not self.file.exists() and time.monotonic() < until:
+        until, said = time.monotonic() + 120, ""
+        # The file is there before it is written.
+        while not said.rstrip().endswith("}") and time.monotonic() < until:
             time.sleep(0.05)
-        self.address = json.loads(self.file.read_text())["address"]
+            said = self.file.read_text() if self.file.exists() else ""
+        self.address = json.loads(said)["address"]
         self.workers: list[subprocess.Popen[bytes]] = []
 
     def start(self, *words: object, **environment: str) -> subprocess.Popen[bytes]:
