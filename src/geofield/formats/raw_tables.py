@@ -249,11 +249,14 @@ def _vector(path: Path, layer: str | None) -> RawTable:
     if name not in table.column_names:
         return RawTable(path.name, table)
     geometry = table[name].combine_chunks()
-    binary = geometry.to_numpy(zero_copy_only=False)
-    crs = said_crs(path, meta["crs"], lambda: shapely.from_wkb(binary, on_invalid="ignore"))
+    crs = said_crs(path, meta["crs"], lambda: _shapes(geometry))
     if _is_curved(geometry):  # only here GDAL makes lines of arcs
         geometry = pa.array(pyogrio.raw.read(path, layer=layer, columns=[])[2], pa.binary())
     return RawTable(path.name, table.drop_columns(name), geometry, name, crs)
+
+
+def _shapes(geometry: pa.Array) -> Any:
+    return shapely.from_wkb(geometry.to_numpy(zero_copy_only=False), on_invalid="ignore")
 
 
 def _is_curved(geometry: pa.Array) -> bool:
