@@ -7,18 +7,20 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+import numpy as np
 import pytest
 import shapely
-from formats_plan import NAME, SCALE, make_dataset
+from formats_plan import NAME, SCALE, UTM, X0, Y0, make_dataset
 from isoxml.models.base import v3, v4
 from isoxml.util.isoxml_io import isoxml_from_path
 from pyproj import Geod
 
-from geofield import __version__
+from geofield import __version__, schema
 from geofield.errors import FormatError
 from geofield.formats import read_dataset, validate_file, write_dataset
 from geofield.formats.arrow import to_lonlat
 from geofield.model.dataset import Provenance
+from geofield.model.obstacles import circle_polygons
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.FormatWarning")
 NAMES = {4: "isoxml", 3: "isoxml-v3"}
@@ -122,6 +124,9 @@ BREAKS = [
     ('<PNT A="7"', '<PNT A="2"', "an AB line is"),
     ('D="6389"', 'D="6389.5"', "whole square metres"),
     ('<PLN A="6"', '<PLN A="66"', "no code of this version"),
+    ('<PLN A="6"', '<PLN A="²"', "A='²' is no code of this version"),
+    ('<PLN A="6"', '<PLN A="٦"', "A='٦' is no code of this version"),
+    ('C="35.07', 'C="٣5.07', "is no number with 9 decimals"),
 ]
 
 
@@ -211,6 +216,48 @@ def test_rings_that_cross_themselves_are_repaired(tmp_path):
     dataset = read_dataset(task_data(tmp_path, polygon(1, RING, BOW), polygon(6, BOW)))
     assert dataset.table("field").geometry.is_valid.all()
     assert len(dataset.table("obstacles")) == 2
+
+
+def test_a_hole_whose_first_corner_is_rounded_beyond_the_border_is_one(tmp_path):
+    """It was gone without a word, and ground in it for driving."""
+    hole = [(10.0 - 1e-9, 50.001), (10.001, 50.001), (10.001, 50.002), (10.0 - 1e-9, 50.001)]
+    rest = shapely.Polygon(RING).difference(shapely.Polygon(hole))
+    field = read_dataset(task_data(tmp_path, polygon(1, RING, hole))).table("field").to_crs(4326)
+    assert shapely.symmetric_difference(field.geometry.iloc[0], rest).area < 1e-6 * rest.area
+
+
+def test_trees_that_a_cut_name_leaves_out_are_in_their_obstacle(tmp_path):
+    """Nine trees stood in it, eight of them anew and 2 m wide."""
+    dataset = make_dataset()
+    x, y = (np.linspace(20, 75, 12) + X0, np.full(12, Y0 + 30.0))
+    rows = {"obstacle_no": range(1001, 1013), "kind": ["tree"] * 12, "status": ["detected"] * 12}
+    hedge = schema.table(schema.OBSTACLES, rows, circle_polygons(x, y, np.full(12, 3.5), UTM), UTM)
+    dataset.tables["obstacles"] = hedge
+    write_dataset(dataset, tmp_path, ["isoxml"])
+    back = read_dataset(tmp_path / "isoxml").table("obstacles")
+    assert back[["obstacle_no", "kind"]].values.tolist() == [[1001, "tree"]]
+    assert shapely.symmetric_difference(back.geometry[0], hedge.union_all()).area < 0.01
+
+
+@pytest.mark.parametrize("west", [10.0, 179.998, -179.9999, 179.9955])
+def test_a_heading_through_a_field_goes_on_across_180(tmp_path, west):
+    """A tenth of the line was there."""
+    ring = [((x - 10 + west + 180) % 360 - 180, y) for x, y in RING]
+    point = f'<PNT A="6" C="50.0015" D="{(west + 0.0021 + 180) % 360 - 180}"/>'
+    line = f'<GPN A="GPN1" C="2" G="80"><LSG A="5">{point}</LSG></GPN>'
+    dataset = read_dataset(task_data(tmp_path, polygon(1, ring), f'<GGP A="GGP1">{line}</GGP>'))
+    (found,) = dataset.table("segments").to_crs(4326).geometry
+    (lon0, lat0), (lon1, lat1) = found.coords
+    azimuth, _, metres = Geod(ellps="WGS84").inv(lon0, lat0, lon1, lat1)
+    assert (azimuth, metres) == pytest.approx((80.0, 291.198), abs=2e-3)
+
+
+@pytest.mark.parametrize("figure", ["nan", "inf", "1e400", "north"])
+def test_positions_that_are_no_numbers(tmp_path, figure):
+    """Infinity ended in a traceback of GEOS."""
+    ring = [*RING[:3], (10.0, figure), RING[0]]
+    with pytest.raises(FormatError, match=f"PNT C='{figure}' is no number"):
+        read_dataset(task_data(tmp_path, polygon(1, ring)))
 
 
 @pytest.mark.parametrize(("pattern", "kind"), [

@@ -60,7 +60,7 @@ def check(path: Path) -> Iterator[Finding]:
         yield Finding("error", file.name, f"VersionMajor is {version!r}, not 3 or 4")
         return
     for name in ("VersionMinor", "DataTransferOrigin"):
-        if not root.get(name, "").isdigit():
+        if not _is_whole(root.get(name, "")):
             yield Finding("error", file.name, f"the root lacks {name}")
     codes = _CODES[4 if version == "4" else 3]
     ids: set[str] = set()
@@ -71,6 +71,11 @@ def check(path: Path) -> Iterator[Finding]:
     yield from _check_references(root, ids)
     for field in root.iter("PFD"):
         yield from _check_field(field)
+
+
+def _is_whole(text: str) -> bool:
+    """Whether a text is digits alone, those of XML: Python's are more, as ²."""
+    return text.isascii() and text.isdigit()
 
 
 def _check_element(
@@ -93,7 +98,7 @@ def _check_element(
         yield Finding("error", where, f"the designator has {len(name)} of {DESIGNATOR} characters")
     for (owner, attribute), allowed in codes.items():
         value = element.get(attribute)
-        if owner == tag and value is not None and not (value.isdigit() and int(value) in allowed):
+        if owner == tag and value is not None and not (_is_whole(value) and int(value) in allowed):
             yield Finding("error", where, f"{attribute}={value!r} is no code of this version")
     if tag == "PNT":
         yield from _check_position(element, where)
@@ -102,7 +107,7 @@ def _check_element(
 def _check_position(point: ET.Element, where: str) -> Iterator[Finding]:
     for attribute, limit in (("C", 90.0), ("D", 180.0)):
         text = point.get(attribute, "")
-        if not re.fullmatch(r"[-+]?\d+(\.\d{1,9})?", text):
+        if not re.fullmatch(r"[-+]?[0-9]+(\.[0-9]{1,9})?", text):
             yield Finding("error", where, f"{attribute}={text!r} is no number with 9 decimals")
         elif abs(float(text)) > limit:
             yield Finding("error", where, f"{attribute}={text} is beyond {limit:g} degrees")
@@ -120,7 +125,7 @@ def _check_references(root: ET.Element, ids: set[str]) -> Iterator[Finding]:
 
 def _check_field(field: ET.Element) -> Iterator[Finding]:
     where = f"PFD {field.get('C')}"
-    if not field.get("D", "").isdigit():
+    if not _is_whole(field.get("D", "")):
         yield Finding("error", where, f"the area D={field.get('D')!r} is not whole square metres")
     order = [_ORDER_V4.index(child.tag) for child in field if child.tag in _ORDER_V4]
     if order != sorted(order):
@@ -151,6 +156,6 @@ def _check_pattern(pattern: ET.Element) -> Iterator[Finding]:
     if pattern.get("C") == "1" and kinds != ["6", "7"]:
         yield Finding("error", where, "an AB line is a point 6, then a 7")
     heading = pattern.get("G")
-    number = None if heading is None else re.fullmatch(r"\d{1,3}(\.\d+)?", heading)
+    number = None if heading is None else re.fullmatch(r"[0-9]{1,3}(\.[0-9]+)?", heading)
     if heading is not None and (number is None or float(heading) > 360):
         yield Finding("error", where, f"the heading is {heading}")

@@ -25,8 +25,6 @@ from geofield.formats.isoxml.codes import (
 )
 from geofield.wording import counted
 
-#: What helps where task data are not as the standard has them.
-_AGAIN = "Export the task data again from the terminal or farm program."
 #: Steps of an arc, degrees: 2 mm between arc and chord at 50 m.
 _ARC_STEP_DEG = 1.0
 #: Half the length of an A+ line where there is no field to draw it through, metres.
@@ -66,24 +64,20 @@ def guidance_lines(field: ET.Element, outline: Any) -> tuple[list[dict[str, Any]
 
 def position(point: ET.Element) -> tuple[float, float]:
     """Longitude and latitude of a PNT, degrees."""
-    try:
-        return float(point.get("D", "")), float(point.get("C", ""))
-    except ValueError as error:
-        raise FormatError(
-            f"A point's position is not two numbers: C={point.get('C')!r}, D={point.get('D')!r}.",
-            hint=_AGAIN,
-        ) from error
+    return _number(point, "D", ""), _number(point, "C", "")
 
 
-def _number(attribute: str, text: str) -> float:
-    """A figure of a guidance pattern."""
+def _number(element: ET.Element, attribute: str, usual: str) -> float:
+    """A figure of an element, which is finite."""
+    text = element.get(attribute, usual)
     try:
         number = float(text)
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
         raise FormatError(
-            f"A guidance pattern (GPN) has {attribute}={text!r}, which is no number.", hint=_AGAIN
+            f"{element.tag} {attribute}={text!r} is no number.",
+            hint="Export the task data again from the terminal or farm program.",
         )
     return number
 
@@ -95,7 +89,7 @@ def _pattern_line(pattern: ET.Element, line: ET.Element, outline: Any) -> tuple[
         return _pivot(pattern, line)
     shape = _polyline(line)
     if kind == Guidance.A_PLUS and shape is None:
-        return _through(line, pattern.get("G"), outline)
+        return _through(pattern, line, outline)
     return shape, "" if shape is not None else "fewer than two points"
 
 
@@ -104,19 +98,21 @@ def _polyline(line: ET.Element) -> Any:
     return shapely.LineString(positions) if len(positions) >= 2 else None
 
 
-def _through(line: ET.Element, heading: str | None, outline: Any) -> tuple[Any, str]:
+def _through(pattern: ET.Element, line: ET.Element, outline: Any) -> tuple[Any, str]:
     """A line through one point along a heading, as far as the field reaches."""
     points = line.findall("PNT")
-    if not points or heading is None:
+    if not points or pattern.get("G") is None:
         return None, "an A+ line without a point or heading"
     lon, lat = position(points[0])
-    heading_deg = _number("G", heading)
+    heading_deg = _number(pattern, "G", "")
     reach_m = _REACH_M
     if not outline.is_empty:
         corners = shapely.get_coordinates(outline)
         start = np.full(len(corners), lon), np.full(len(corners), lat)
         reach_m = float(np.max(GEOD.inv(*start, corners[:, 0], corners[:, 1])[2]))
-    ends = [GEOD.fwd(lon, lat, heading_deg + turn, reach_m)[:2] for turn in (180.0, 0.0)]
+    both = (GEOD.fwd(lon, lat, heading_deg + turn, reach_m) for turn in (180.0, 0.0))
+    # On across 180, where the outline goes on, too.
+    ends = [(lon + (x - lon + 180.0) % 360.0 - 180.0, y) for x, y, _ in both]
     whole = shapely.LineString([ends[0], (lon, lat), ends[1]])
     parts = shapely.get_parts(shapely.intersection(whole, outline))
     inside = [part for part in parts if part.geom_type == "LineString"]
@@ -140,7 +136,7 @@ def _pivot(pattern: ET.Element, line: ET.Element) -> tuple[Any, str]:
             azimuths.append(azimuth)
             distances.append(distance)
     # H is in millimetres; without it the first point lies on the arc.
-    radius_m = _number("H", pattern.get("H", "0")) / 1000.0 or (distances[0] if distances else 0.0)
+    radius_m = _number(pattern, "H", "0") / 1000.0 or (distances[0] if distances else 0.0)
     if radius_m <= 0.0:
         return None, "a pivot without a radius"
     start, turn = (azimuths[0] if azimuths else 0.0), 360.0

@@ -150,6 +150,8 @@ def _obstacles(field: ET.Element, outline: Any) -> Iterable[dict[str, Any]]:
             continue
         name = element.get("B", "")
         inside = {name, *(f"Obstacle {number}" for number in re.findall(r"\d+", name))}
+        if name.endswith("…") and _NUMBERS.match(name):  # cut: any other one may be in it, too
+            inside |= {each for each, _ in points if _NUMBERS.match(each)}
         for shape in _polygons(element):
             if any(_same(shape, hole) for hole in holes):
                 continue
@@ -196,5 +198,8 @@ def _polygons(element: ET.Element) -> Iterable[Any]:
             (inner if line.get("A") == LineType.INTERIOR else outer).append(positions)
     for positions in outer:
         shell = shapely.Polygon(positions)
-        holes = [hole for hole in inner if shell.covers(shapely.Point(hole[0]))]
+        # Its first corner may lie on the border, a rounding beyond it.
+        holes = [
+            hole for hole in inner if shell.covers(shapely.Polygon(hole).representative_point())
+        ]
         yield shapely.Polygon(positions, holes)
