@@ -171,6 +171,26 @@ def test_a_count_below_zero_is_refused(folder, tmp_path):
         read_dataset(broken)
 
 
+@pytest.mark.parametrize(("name", "line", "words"), [
+    ("Field.txt", 8, "has no StartFix"),
+    ("Boundary.txt", 7, "is damaged in ring 1"),
+    ("TrackLines.txt", 3, "is damaged in track 1"),
+    ("TrackLines.txt", 5, "is damaged in track 1"),
+    ("Flags.txt", 2, "is no flag"),
+])  # fmt: skip
+@pytest.mark.parametrize("figure", ["nan", "inf"])
+def test_figures_that_are_none(folder, tmp_path, name, line, words, figure):
+    """They ended in tracebacks of GEOS; an obstacle whose flag had one was a hole."""
+    broken = tmp_path / "Field"
+    shutil.copytree(folder, broken)
+    content = lines(broken / name)
+    content[line] = ",".join([figure, *content[line].split(",")[1:]])
+    (broken / name).write_bytes("\r\n".join(content).encode())
+    with pytest.raises(FormatError, match=words):
+        read_dataset(broken)
+    assert any(each.level == "error" for each in validate_file(broken))
+
+
 @given(st.floats(-70, 70), st.floats(-179, 179), st.floats(-3000, 3000), st.floats(-3000, 3000))
 def test_plane_there_and_back(lat, lon, east, north):
     plane = LocalPlane(lat, lon)

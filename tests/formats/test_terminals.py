@@ -171,6 +171,34 @@ def test_headland_of_agopengps(tmp_path):
     assert file.read_text().split() == ["$Headland"]
 
 
+@pytest.mark.parametrize("turned_deg", [0, 17])
+@pytest.mark.parametrize("around", [False, True])
+def test_agopengps_turns_at_a_hole_where_a_headland_is_around_it(tmp_path, turned_deg, around):
+    """Without one, the edge of a hole on whole metres was the line of its headland."""
+    hole = shapely.box(500_090, 5_600_050, 500_110, 5_600_070)
+    plain = shapely.box(500_000, 5_600_000, 500_200, 5_600_120) - hole
+    crs = CRS.from_epsg(32632)
+    outline: Any = shapely.affinity.rotate(plain, turned_deg)
+    tracks = gf.plan_tracks(outline, crs=crs, spacing_m=6, headland_m=12, headland_holes=around)
+    gf.Plan(Field(outline, crs), tracks=tracks).write(tmp_path, formats=["agopengps"])
+    (file,) = tmp_path.rglob("Headland.txt")
+    _, outer, *rows = file.read_text().split()
+    count, *rows = rows[int(outer) :]
+    assert len(rows) == int(count)
+    if not around:
+        assert count == "0"
+        return
+    edge = np.array([row.split(",") for row in rows], dtype=float)[:, :2]
+    line = shapely.LinearRing(edge)
+    assert shapely.is_ccw(line)
+    assert np.hypot(*(np.roll(edge, -1, axis=0) - edge).T).max() <= 0.55 + 0.003
+    plane = LocalPlane(*map(float, (file.parent / "Field.txt").read_text().split()[-1].split(",")))
+    placed = in_metres(shapely.Polygon(plane.to_lonlat(*edge.T)), crs)
+    ring = shapely.Polygon(outline.interiors[0])
+    assert shapely.distance(placed.exterior, ring) == pytest.approx(12.0, abs=0.01)
+    assert placed.covers(ring)
+
+
 def test_the_headland_and_its_line_have_no_spikes_along_a_hole():
     corner = np.array([500_000.0, 5_600_000.0])
     plain, hole = shapely.box(0, 0, 200, 100), shapely.box(85, 3, 95, 50)

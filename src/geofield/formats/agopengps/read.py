@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -98,10 +99,11 @@ def _flags(folder: Path, plane: LocalPlane) -> list[tuple[Any, int | None]]:
         match = _FLAG.match(parts[-1]) if len(parts) == 8 else None
         if match is not None:
             try:
-                placed = plane.to_plane(float(parts[1]), float(parts[0]))
+                lat, lon = _numbers(",".join(parts[:2]))
             except ValueError:
                 raise FormatError(f"{path}: {line[:60]!r} is no flag.", hint=_AGAIN) from None
             number = None if match.group(1) is None else int(match.group(1))
+            placed = plane.to_plane(lon, lat)
             found.append((shapely.Point(plane.to_lonlat(*placed.T)[0]), number))
     return found
 
@@ -173,7 +175,7 @@ def _lines(folder: Path) -> tuple[list[tuple[str, np.ndarray]], list[str]]:
                 told.append(f"track {name!r} left out: it goes around a pivot")
             else:
                 found.append((name, np.array(points)))
-                if float(nudge):
+                if any(_numbers(nudge)):
                     told.append(f"track {name!r} taken where it was drawn, not nudged {nudge} m")
             position, number = end_row, number + 1
     except ValueError as error:
@@ -191,7 +193,11 @@ def _lonlat_polygon(ring: list[list[float]], plane: LocalPlane) -> Any:
 
 
 def _numbers(text: str) -> list[float]:
-    return [float(part) for part in text.split(",")]
+    """The figures of a line; the first two, its place, are finite."""
+    numbers = [float(part) for part in text.split(",")]
+    if not all(map(math.isfinite, numbers[:2])):
+        raise ValueError(text)
+    return numbers
 
 
 def _text(path: Path) -> list[str]:

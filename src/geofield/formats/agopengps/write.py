@@ -25,6 +25,7 @@ from geofield.formats.terminal import (
     terminal_obstacles,
 )
 from geofield.model import Dataset
+from geofield.model.track_statistics import SHARED_EDGE_M
 
 #: Largest distance of boundary vertices in metres, by area in hectares.
 _STEPS = ((20.0, 1.1), (40.0, 2.2), (float("inf"), 3.3))
@@ -101,7 +102,8 @@ def _headland(
         around = [
             edge
             for inner, edge in zip(main.interiors, placed[1:], strict=True)
-            if shapely.Polygon(inner).covers(ring)
+            # Without a strip around a hole its own ring is there, rounded.
+            if shapely.Polygon(inner).buffer(-2 * SHARED_EDGE_M).covers(ring)
         ]
         lines += _ring(around[0], step / 2) if around else ["0"]
     return lines
