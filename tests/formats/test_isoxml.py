@@ -16,6 +16,7 @@ from isoxml.util.isoxml_io import isoxml_from_path
 from pyproj import Geod
 
 from geofield import __version__, schema
+from geofield.crs import ground_areas_m2
 from geofield.errors import FormatError
 from geofield.formats import read_dataset, validate_file, write_dataset
 from geofield.formats.arrow import to_lonlat
@@ -237,6 +238,26 @@ def test_trees_that_a_cut_name_leaves_out_are_in_their_obstacle(tmp_path):
     back = read_dataset(tmp_path / "isoxml").table("obstacles")
     assert back[["obstacle_no", "kind"]].values.tolist() == [[1001, "tree"]]
     assert shapely.symmetric_difference(back.geometry[0], hedge.union_all()).area < 0.01
+
+
+def test_fences_and_obstacles_that_are_lines_stand_there(tmp_path):
+    """They were left out without a word, as were drains and flags."""
+    ends = '<PNT A="2" C="50.001" D="10.001"/><PNT A="2" C="50.001" D="10.002"/>'
+    kinds = {"7": "", "9": ' C="3000"', "6": "", "5": ""}
+    lines = [f'<LSG A="{kind}"{width}>{ends}</LSG>' for kind, width in kinds.items()]
+    flags = ['<PNT A="1" C="50.001" D="10.001"/>'] * 2
+    task_data(tmp_path, polygon(1, RING), *lines, *flags)
+    dataset = read_dataset(tmp_path)
+    long_m = Geod(ellps="WGS84").line_length([10.001, 10.002], [50.001, 50.001])
+    areas = ground_areas_m2(dataset.table("obstacles").geometry, dataset.crs)
+    assert areas.tolist() == pytest.approx([0.1 * long_m, 3.0 * long_m], rel=0.05)
+    assert len(dataset.table("tracks")) == 1
+    for words in (
+        "1 line of type fence taken",
+        "1 line left out: drainage",
+        "2 points left out: f",
+    ):
+        assert any(words in note for note in dataset.notes)
 
 
 @pytest.mark.parametrize("west", [10.0, 179.998, -179.9999, 179.9955])

@@ -32,18 +32,29 @@ class LineType(StrEnum):
 
     EXTERIOR = "1"
     INTERIOR = "2"
+    TRAMLINE = "3"
+    SAMPLING_ROUTE = "4"
     GUIDANCE = "5"
+    DRAINAGE = "6"
+    FENCE = "7"
+    FLAG = "8"
+    OBSTACLE = "9"
 
 
 class PointType(StrEnum):
     """PNT, attribute A."""
 
+    FLAG = "1"
     OTHER = "2"
+    FIELD_ACCESS = "3"
+    STORAGE = "4"
     OBSTACLE = "5"
     GUIDANCE_A = "6"
     GUIDANCE_B = "7"
     GUIDANCE_CENTRE = "8"
     GUIDANCE_POINT = "9"
+    REFERENCE_POINT = "10"
+    HOMEBASE = "11"
 
 
 class Guidance(StrEnum):

@@ -51,7 +51,7 @@ def guidance_lines(field: ET.Element, outline: Any) -> tuple[list[dict[str, Any]
             into = rows if pattern.get("E", REPEAT_NONE) == REPEAT_NONE else repeated
             into.append({"name": name, "geometry": shape})
     for line in field.findall("LSG"):
-        shape = _polyline(line)
+        shape = polyline(line)
         if line.get("A") == LineType.GUIDANCE and shape is not None:
             rows.append({"name": line.get("B") or "", "geometry": shape})
     if rows and repeated:
@@ -64,10 +64,10 @@ def guidance_lines(field: ET.Element, outline: Any) -> tuple[list[dict[str, Any]
 
 def position(point: ET.Element) -> tuple[float, float]:
     """Longitude and latitude of a PNT, degrees."""
-    return _number(point, "D", ""), _number(point, "C", "")
+    return figure(point, "D", ""), figure(point, "C", "")
 
 
-def _number(element: ET.Element, attribute: str, usual: str) -> float:
+def figure(element: ET.Element, attribute: str, usual: str) -> float:
     """A figure of an element, which is finite."""
     text = element.get(attribute, usual)
     try:
@@ -87,13 +87,14 @@ def _pattern_line(pattern: ET.Element, line: ET.Element, outline: Any) -> tuple[
     kind = pattern.get("C")
     if kind == Guidance.PIVOT:
         return _pivot(pattern, line)
-    shape = _polyline(line)
+    shape = polyline(line)
     if kind == Guidance.A_PLUS and shape is None:
         return _through(pattern, line, outline)
     return shape, "" if shape is not None else "fewer than two points"
 
 
-def _polyline(line: ET.Element) -> Any:
+def polyline(line: ET.Element) -> Any:
+    """An LSG as it stands; None of fewer than two points."""
     positions = [position(point) for point in line.findall("PNT")]
     return shapely.LineString(positions) if len(positions) >= 2 else None
 
@@ -104,7 +105,7 @@ def _through(pattern: ET.Element, line: ET.Element, outline: Any) -> tuple[Any, 
     if not points or pattern.get("G") is None:
         return None, "an A+ line without a point or heading"
     lon, lat = position(points[0])
-    heading_deg = _number(pattern, "G", "")
+    heading_deg = figure(pattern, "G", "")
     reach_m = _REACH_M
     if not outline.is_empty:
         corners = shapely.get_coordinates(outline)
@@ -136,7 +137,7 @@ def _pivot(pattern: ET.Element, line: ET.Element) -> tuple[Any, str]:
             azimuths.append(azimuth)
             distances.append(distance)
     # H is in millimetres; without it the first point lies on the arc.
-    radius_m = _number(pattern, "H", "0") / 1000.0 or (distances[0] if distances else 0.0)
+    radius_m = figure(pattern, "H", "0") / 1000.0 or (distances[0] if distances else 0.0)
     if radius_m <= 0.0:
         return None, "a pivot without a radius"
     start, turn = (azimuths[0] if azimuths else 0.0), 360.0

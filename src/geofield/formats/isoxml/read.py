@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import replace
+from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from geofield.crossings import mended
 from geofield.errors import FormatError, SeveralFieldsError
 from geofield.formats.foreign import RawLayer, read_foreign
 from geofield.formats.isoxml.codes import LineType, PointType, PolygonType
-from geofield.formats.isoxml.guidance import guidance_lines, position
+from geofield.formats.isoxml.guidance import figure, guidance_lines, polyline, position
 from geofield.formats.registry import task_file
 from geofield.formats.xml import read_xml
 from geofield.model import Dataset
@@ -26,12 +27,19 @@ from geofield.wording import counted
 
 #: What no vehicle may enter; a boundary's own holes stay holes.
 _STANDING = {
-    PolygonType.OBSTACLE: "obstacle",
-    PolygonType.WATER: "water",
-    PolygonType.BUILDING: "building",
-    PolygonType.ROAD: "road",
-    PolygonType.WINDBREAK: "windbreak",
+    PolygonType.OBSTACLE,
+    PolygonType.WATER,
+    PolygonType.BUILDING,
+    PolygonType.ROAD,
+    PolygonType.WINDBREAK,
 }
+_STANDING_LINES = {LineType.OBSTACLE, LineType.FENCE}
+#: What is in a field, its types, those that are obstacles, and those of which nothing is told.
+_PARTS: tuple[tuple[str, str, type[StrEnum], Collection[str], Collection[str]], ...] = (
+    ("PLN", "polygon", PolygonType, _STANDING, {PolygonType.BOUNDARY, PolygonType.OBSTACLE}),
+    ("LSG", "line", LineType, _STANDING_LINES, {LineType.GUIDANCE, LineType.OBSTACLE}),
+    ("PNT", "point", PointType, (), {PointType.OBSTACLE}),
+)
 _NUMBERS = re.compile(r"^Obstacle (\d+)(?:\+[\d+]*…?)?$")
 #: How much of an obstacle's area may differ from a hole that it stands for.
 _SAME_AREA = 1e-4
@@ -119,21 +127,22 @@ def _unwrap(field: ET.Element) -> None:
 
 def _told(field: ET.Element) -> Iterable[str]:
     """What was taken for obstacles without the name, and what is left out, for people."""
-    found = Counter(str(element.get("A")) for element in field.findall("PLN"))
-    for code, count in sorted(found.items()):
-        polygons = counted(count, "polygon")
-        if code in _STANDING and code != PolygonType.OBSTACLE:
-            yield f"{polygons} of type {_STANDING[PolygonType(code)]} taken as obstacles"
-        elif code not in (*_STANDING, PolygonType.BOUNDARY):
-            names = {each.value: each.name.lower().replace("_", " ") for each in PolygonType}
-            yield f"{polygons} left out: {names.get(code, f'type {code}')}"
+    for tag, what, types, standing, plain in _PARTS:
+        names = {each.value: each.name.lower().replace("_", " ") for each in types}
+        found = Counter(str(element.get("A")) for element in field.findall(tag))
+        for code, count in sorted(found.items()):
+            name = names.get(code, f"type {code}")
+            if code in standing and code not in plain:
+                yield f"{counted(count, what)} of type {name} taken as obstacles"
+            elif code not in plain:
+                yield f"{counted(count, what)} left out: {name}"
     zones = len(field.findall("TZN"))
     if zones:
         yield f"{counted(zones, 'treatment zone')} left out"
 
 
 def _obstacles(field: ET.Element, outline: Any) -> Iterable[dict[str, Any]]:
-    """Obstacle polygons, and obstacle points that lie in none of the same name or number."""
+    """Obstacle polygons and lines, and obstacle points in no polygon of their name or number."""
     points = [
         (point.get("B", ""), shapely.Point(position(point)))
         for point in field.findall("PNT")
@@ -163,6 +172,10 @@ def _obstacles(field: ET.Element, outline: Any) -> Iterable[dict[str, Any]]:
                 "kind": "tree" if here else "other",
                 "geometry": shape,
             }
+    for line in field.findall("LSG"):
+        shape = polyline(line)
+        if line.get("A") in _STANDING_LINES and shape is not None:
+            yield {"radius_m": figure(line, "C", "0") / 2000.0, "kind": "other", "geometry": shape}
     for name, point in points:
         yield {"obstacle_no": _number_in(name), "kind": "tree", "geometry": point}
 
