@@ -5,10 +5,12 @@ import json
 import geopandas as gpd
 import numpy as np
 import pytest
+import rasterio
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from PIL import Image
+from rasterio.transform import from_origin
 from shapely import Point, box
 
 import geofield as gf
@@ -276,6 +278,34 @@ def test_drawing_shows_the_rows_that_were_compared(tmp_path, drawn):
     with Image.open(tmp_path / "hits.png") as picture:
         colours = {c for _, c in picture.getcolors(10_000)}
     assert colours == ({(255, 255, 255)} if drawn == "nothing" else {(255, 255, 255), HIT})
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(300, 200), (5000, 150)])
+def test_drawing_on_a_picture_however_large(tmp_path, capsys, columns, rows):
+    """Of one above 4096 px the command asked for a point, which it has no option for."""
+    from geofield.cli import main
+
+    x, y, size = 500_000.0, 5_500_000.0, 0.5
+    scene = {"driver": "GTiff", "width": columns, "height": rows, "count": 3, "dtype": "uint8"}
+    place = {"crs": UTM, "transform": from_origin(x, y, size, size)}
+    with rasterio.open(tmp_path / "scene.tif", "w", **scene, **place) as file:
+        file.write(np.full((3, rows, columns), 120, np.uint8))
+    shares = np.array([[0.25, 0.4], [0.75, 0.6]])
+    found = table(shares * [columns, -rows] * size + [x, y])
+    found.to_file(tmp_path / "found.gpkg", layer="obstacles")
+    found[:1].to_file(tmp_path / "truth.gpkg")
+    files = [str(tmp_path / name) for name in ("found.gpkg", "truth.gpkg")]
+    more = ["--scene", str(tmp_path / "scene.tif"), "--draw", str(tmp_path / "hits.png")]
+    with pytest.raises(SystemExit, match="0"):
+        main(["evaluate", *files, *more])
+    assert "Drawn to" in capsys.readouterr().err
+    with Image.open(tmp_path / "hits.png") as picture:
+        drawn = np.asarray(picture.convert("RGB"))
+    assert (drawn == 120).all(axis=2).any()
+    for share, colour in zip(shares, (HIT, FALSE), strict=True):
+        row, column = np.nonzero((drawn == colour).all(axis=2))
+        middle = np.array([(column.min() + column.max()) / 2, (row.min() + row.max()) / 2])
+        assert middle == pytest.approx(share * drawn.shape[1::-1], abs=2)
 
 
 def test_drawing_shows_detections_that_are_points(tmp_path):

@@ -113,9 +113,11 @@ def draw_matches(
     from PIL import Image, ImageDraw
 
     if isinstance(scene, Path):
-        from geofield.imagery import read_scene
+        from geofield.imagery.pictures import open_reader
+        from geofield.imagery.scene import read_part
 
-        scene = read_scene(scene)
+        reader = open_reader(str(scene))  # read coarser where it is large
+        scene = read_part(reader, (0, 0, reader.grid.width_px, reader.grid.height_px))
     detected, truth = compared(detected, truth, area)
     match = next(iter(result.matches.values()))
     crs = detected.crs
