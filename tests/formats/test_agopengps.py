@@ -14,6 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Geod
 
+import geofield as gf
+from geofield.crs import ground_scale
 from geofield.errors import FormatError
 from geofield.formats import format_named, read_dataset, validate_file, write_dataset
 from geofield.formats.agopengps.plane import LocalPlane, densified, ring_headings
@@ -110,6 +112,34 @@ def test_flags(folder):
     assert abs(float(lon) - row["lon"]) < 1e-8
     assert (heading, colour, number) == ("0", "0", "1")
     assert note == "Obstacle 1 radius 2.50 m"
+
+
+def test_flags_stand_on_the_plane_around_the_start_as_it_is_written(folder):
+    lat0, lon0 = map(float, lines(folder / "Field.txt")[8].split(","))
+    f0 = math.radians(lat0)
+    for row in lines(folder / "Flags.txt")[2:-1]:
+        lat, lon, east, north = map(float, row.split(",")[:4])
+        f = math.radians(lat)
+        per_lat = 111132.92 - 559.82 * math.cos(2 * f0) + 1.175 * math.cos(4 * f0)
+        per_lat -= 0.0023 * math.cos(6 * f0)
+        per_lon = 111412.84 * math.cos(f) - 93.5 * math.cos(3 * f) + 0.118 * math.cos(5 * f)
+        assert north == pytest.approx((lat - lat0) * per_lat, abs=6e-4)
+        assert east == pytest.approx((lon - lon0) * per_lon, abs=6e-4)
+
+
+@pytest.mark.parametrize(("side_m", "step"), [(448, 1.1), (449, 2.2), (633, 2.2), (634, 3.3)])
+def test_vertices_are_as_far_apart_as_the_area_allows(tmp_path, side_m, step):
+    """Up to 20 and 40 hectares; half as far around holes, the outer ring the other way round."""
+    x, y = 500_000.0, 5_540_000.0
+    side = side_m * float(ground_scale(UTM, x, y))
+    hole = shapely.box(x + 50, y + 50, x + 80, y + 80)
+    outline = shapely.Polygon(shapely.box(x, y, x + side, y + side).exterior, [hole.exterior])
+    gf.Plan(gf.Field(outline, UTM)).write(tmp_path, formats=["agopengps"])
+    (folder,) = (tmp_path / "agopengps" / "Fields").iterdir()
+    for ring, most, turned in zip(rings_of(folder), (step, step / 2), (False, True), strict=True):
+        sides = np.hypot(*(np.roll(ring[:, :2], -1, axis=0) - ring[:, :2]).T)
+        assert most * 0.9 < sides.max() <= most + 0.003
+        assert shapely.is_ccw(shapely.LinearRing(ring[:, :2])) == turned
 
 
 def test_no_fault_by_the_rules(folder):
