@@ -54,10 +54,12 @@ def _notes(srs: str, lon: float, lat: float) -> tuple[str, ...]:
         return ()
     told = f"Positions in {authority_name(crs)} are good to {good_m:g} m, by PROJ's word"
     for way in ways.unavailable_operations:
-        for grid in way.grids:
-            if 0.0 <= way.accuracy <= good_m / 2.0:  # worth fetching
-                fetch = f"pyproj sync --file {grid.short_name}"
-                return (f"{told}. With its grid to {way.accuracy:g} m: {fetch}",)
+        # A way may need two: with one of them it is not there yet.
+        lacks = [grid.short_name for grid in way.grids if not grid.available]
+        if lacks and 0.0 <= way.accuracy <= good_m / 2.0:  # worth fetching
+            fetch = ", then ".join(f"pyproj sync --file {name}" for name in lacks)
+            grids = "its grid" if len(lacks) == 1 else f"its {len(lacks)} grids"
+            return (f"{told}. With {grids} to {way.accuracy:g} m: {fetch}",)
     return (f"{told}.",)
 
 
