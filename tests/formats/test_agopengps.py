@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from pyproj import Geod
 
 import geofield as gf
-from geofield.crs import ground_scale
+from geofield.crs import ground_areas_m2, ground_scale
 from geofield.errors import FormatError
 from geofield.formats import format_named, read_dataset, validate_file, write_dataset
 from geofield.formats.agopengps.plane import LocalPlane, densified, ring_headings
@@ -190,6 +190,20 @@ def test_what_the_program_itself_writes(folder, tmp_path):
     told = "; ".join(back.notes)
     assert "'Straight' taken where it was drawn, not nudged 0.3 m" in told
     assert "'Pivot' left out: it goes around a pivot" in told
+
+
+@pytest.mark.parametrize("flags", [None, ["$Flags", "1", "35.07,33.53,0,0,0,0,1,Gate"]])
+def test_inner_rings_of_the_program_are_obstacles(folder, tmp_path, flags):
+    there = tmp_path / "North 40"
+    shutil.copytree(folder, there)
+    (there / "Flags.txt").unlink()
+    if flags:
+        (there / "Flags.txt").write_text("\r\n".join(flags))
+    back = read_dataset(there)
+    assert len(back.table("field").geometry.iloc[0].interiors) == 0
+    rings = [shapely.Polygon(ring[:, :2]).area for ring in rings_of(folder)[1:]]
+    found = ground_areas_m2(back.table("obstacles").geometry.to_numpy(), back.crs)
+    assert sorted(found) == pytest.approx(sorted(rings), rel=2e-3)
 
 
 def test_a_count_below_zero_is_refused(folder, tmp_path):
