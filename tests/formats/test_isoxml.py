@@ -273,6 +273,29 @@ def test_a_heading_through_a_field_goes_on_across_180(tmp_path, west):
     assert (azimuth, metres) == pytest.approx((80.0, 291.198), abs=2e-3)
 
 
+@pytest.mark.parametrize(("pattern", "kinds", "told"), [
+    ('C="1"', "6", "fewer than two points"),
+    ('C="2" G="90"', "", "an A+ line without a point or heading"),
+    ('C="2"', "6", "an A+ line without a point or heading"),
+    ('C="4" H="9000"', "6", "a pivot without a centre"),
+    ('C="4"', "8", "a pivot without a radius"),
+    ('C="1" E="1"', "67", "1 line to be repeated left out, others being there: New"),
+])  # fmt: skip
+def test_guidance_that_is_not_driven_is_told(tmp_path, pattern, kinds, told):
+    def group(number, name, how, kinds):
+        points = "".join(
+            f'<PNT A="{kind}" C="50.001" D="{10.001 + place / 1000}"/>'
+            for place, kind in enumerate(kinds)
+        )
+        own = f'<GPN A="GPN{number}" B="{name}" {how}><LSG A="5">{points}</LSG></GPN>'
+        return f'<GGP A="GGP{number}">{own}</GGP>'
+
+    groups = group(1, "Old", 'C="1" E="4"', "67"), group(2, "New", pattern, kinds)
+    dataset = read_dataset(task_data(tmp_path, polygon(1, RING), *groups))
+    assert len(dataset.table("tracks")) == 1
+    assert any(told in note for note in dataset.notes)
+
+
 @pytest.mark.parametrize("figure", ["nan", "inf", "1e400", "north"])
 def test_positions_that_are_no_numbers(tmp_path, figure):
     """Infinity ended in a traceback of GEOS."""
