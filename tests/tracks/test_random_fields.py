@@ -316,6 +316,10 @@ def test_a_drive_is_one_line_whose_metres_are_told(drives: list[Drive]) -> None:
         assert turns["to_track"].to_list() == track_no.loc[turns["sequence"] + 1].to_list()
         kind = route.set_index("sequence")["kind"].loc[turns["sequence"]]
         assert (kind == "drive").to_list() == (turns["kind"] == "drive").to_list()
+        # No piece of a curve is rounding alone, and none is driven "-0 m" backwards.
+        assert not np.signbit(turns["reverse_m"]).any()
+        for way in turns.geometry[turns["kind"] != "drive"]:
+            assert np.hypot(*np.diff(way.coords, axis=0).T).min() > 1e-6
 
 
 def test_turns_keep_to_the_ground_and_to_the_turning_radius(drives: list[Drive]) -> None:

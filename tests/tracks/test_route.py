@@ -12,6 +12,7 @@ import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
+from shapely import affinity
 
 from geofield import schema
 from geofield.errors import TrackError, TrackWarning
@@ -123,6 +124,35 @@ def test_shortest_is_shorter(tracks: Tracks) -> None:
     assert drive["shortest"] < 0.9 * drive["boustrophedon"]
 
 
+def test_shortest_is_never_longer_than_in_order() -> None:
+    """It was in 17 of 100 fields, by up to 28 %: reversing was priced as driving forwards only."""
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        field = affinity.rotate(shapely.box(500000, 5600000, 500080, 5600050), 15 * seed)
+        places = shapely.points(rng.uniform((500000, 5600000), (500080, 5600050), (6, 2)))
+        trees = shapely.buffer(places, rng.uniform(1, 5, 6))
+        planned = plan_tracks(field, trees, crs=CRS, spacing_m=8.0)
+        price_m = []
+        for pattern in ("boustrophedon", "shortest"):
+            options: Any = {"pattern": pattern, "curve": "reeds_shepp", "margin_m": 40.0}
+            turns = plan_route(planned, turning_radius_m=5.0, **options).turns
+            assert turns is not None
+            price_m.append(turns["length_m"].sum() + 12 * 5.0 * (turns["fits"] == "no").sum())
+        assert price_m[1] <= price_m[0] + 1e-6, seed
+
+
+@pytest.mark.parametrize("radius_m", [None, 4.0])
+def test_tracks_are_not_finished_one_by_one_behind_a_wall(radius_m: float | None) -> None:
+    """It took 667 m without curves: a way of 60 m around the wall had the price of 6."""
+    field = shapely.box(500000, 5600000, 500200, 5600120)
+    wall = shapely.box(500098, 5600015, 500102, 5600105)
+    planned = plan_tracks(field, [wall], crs=CRS, spacing_m=8.0, direction=90)
+    options: Any = {"turning_radius_m": radius_m, "margin_m": 20.0, "curve": "reeds_shepp"}
+    turns = plan_route(planned, pattern="shortest", **options).turns
+    assert turns is not None
+    assert turns["length_m"].sum() < (370 if radius_m is None else 500)
+
+
 def test_equal_input_gives_equal_routes(tracks: Tracks) -> None:
     one, two = (plan_route(tracks, pattern="shortest", turning_radius_m=5.0) for _ in range(2))
     assert one.route is not None
@@ -202,6 +232,7 @@ def test_shortest_ways_are_shortest() -> None:
     [
         {"pattern": "spiral"},
         {"pattern": "skip", "skip": -1},
+        {"pattern": "skip", "skip": 1.5},
         {"turning_radius_m": 0.0},
         {"turning_radius_m": float("nan")},
         {"turning_radius_m": 500.0},

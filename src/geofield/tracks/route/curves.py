@@ -107,22 +107,29 @@ def trace(
     *,
     step_m: float,
 ) -> FloatArray:
-    """Points (n, 2) along one word from a pose: every `step_m` on arcs, straights by their ends."""
-    x, y, angle = (float(value) for value in start)
-    xs, ys = [np.array([x])], [np.array([y])]
+    """Points (n, 2) along one word from a pose: every `step_m` on arcs, straights by their ends.
+
+    Pieces that rounding made are left out: no machine can tell which way they run.
+    """
+    x, y, angle = (np.array([value]) for value in start)
+    xs, ys = [x], [y]
     for way, part in zip(steer.tolist(), length.tolist(), strict=True):
-        if abs(part) < 1e-12:
+        if part == 0.0:
             continue
+        count = 1 if way == STRAIGHT else max(2, int(np.ceil(abs(part) * radius_m / step_m)))
+        along = part * np.arange(1, count + 1) / count
         if way == STRAIGHT:
-            x, y = x + part * radius_m * np.cos(angle), y + part * radius_m * np.sin(angle)
-            xs.append(np.array([x]))
-            ys.append(np.array([y]))
-            continue
-        count = max(2, int(np.ceil(abs(part) * radius_m / step_m)))
-        turned = angle + way * part * np.arange(1, count + 1) / count
-        xs.append(x + way * radius_m * (np.sin(turned) - np.sin(angle)))
-        ys.append(y - way * radius_m * (np.cos(turned) - np.cos(angle)))
-        x, y, angle = float(xs[-1][-1]), float(ys[-1][-1]), float(turned[-1])
+            x = x + along * radius_m * np.cos(angle)
+            y = y + along * radius_m * np.sin(angle)
+        else:
+            turned = angle + way * along
+            x = x + way * radius_m * (np.sin(turned) - np.sin(angle))
+            y = y - way * radius_m * (np.cos(turned) - np.cos(angle))
+            angle = turned[-1:]
+        if abs(part) > _MATCH:
+            xs.append(x)
+            ys.append(y)
+        x, y = x[-1:], y[-1:]
     return np.column_stack((np.concatenate(xs), np.concatenate(ys)))
 
 

@@ -30,12 +30,10 @@ from geofield.tracks.route.curves import to_unit
 from geofield.tracks.route.order import PATTERNS, Pattern, nearest_start
 from geofield.tracks.route.passage import Passage
 from geofield.tracks.route.shortest import shortest_order
-from geofield.tracks.route.turns import Curve, Turn, as_line, plan_turns, straight_ways
+from geofield.tracks.route.turns import Curve, Turn, as_line
+from geofield.tracks.route.ways import Ways, places_of
 from geofield.tracks.shapes import IntArray
 from geofield.wording import counted
-
-_SPARE_SHARE = 0.45
-"""Of a segment, at most this much may be left out at either end to pass an obstacle."""
 
 
 def plan_route(
@@ -62,7 +60,8 @@ def plan_route(
         From `plan_tracks`.
     pattern : {"boustrophedon", "skip", "shortest"}
         Up one track and down the next; the same leaving out `skip` tracks at every turn; or the
-        order with the shortest drive between segments.
+        order with the shortest drive between segments, where a turn that cannot be driven counts
+        as twelve turning radii more.
     skip : int
         For ``skip``: tracks left out at a turn (1: from track 1 to 3).
     turning_radius_m : float, optional
@@ -100,26 +99,15 @@ def plan_route(
     if turning_radius_m is not None:
         refuse_wide_turns(outline.bounds, turning_radius_m, margin_m)
     lines = np.asarray(tracks.segments.geometry.to_numpy(), dtype=object)
-    ends, legs = _ends(lines) / scale, _legs(lines)
+    ends = places_of(lines) / scale
     track_no = tracks.segments["track_no"].to_numpy(dtype=np.int64)
     passage = Passage(outline, shapes, margin_m=margin_m)
+    ways = Ways(lines, track_no, scale, passage, turning_radius_m, curve)
     rows, backward = nearest_start(ends, track_no, int(skip) if pattern == "skip" else 0, place)
     if pattern == "shortest":
-        rows, backward = shortest_order(
-            ends, rows, backward, passage, radius_m=turning_radius_m, start=place
-        )
-    exits, entries = _poses(ends[rows], legs[rows], backward)
-    if turning_radius_m is None:
-        turns = straight_ways(exits, entries, passage)
-    else:
-        turns = plan_turns(
-            exits,
-            entries,
-            passage,
-            radius_m=turning_radius_m,
-            curve=curve,
-            spare_m=_spare(lines[rows], legs[rows], track_no[rows], backward) / scale,
-        )
+        rows, backward = shortest_order(ends, rows, backward, ways, start=place)
+    turns = ways.along(rows, backward)
+    exits, entries = ways.poses(rows, backward)
     route, table = _tables(
         tracks, rows, backward, turns, exits=exits, entries=entries, radius_m=turning_radius_m
     )
@@ -163,45 +151,6 @@ def _check(pattern: str, curve: str, skip: int, margin_m: float) -> None:
     if skip < 0:
         raise TrackError(f"skip is {skip}; it must be 0 or more tracks.")
     refuse_no_length(none_too=True, margin_m=margin_m)
-
-
-def _ends(lines: NDArray[np.object_]) -> FloatArray:
-    """First and last place of each line, (lines, 2, 2)."""
-    return np.stack([shapely.get_coordinates(shapely.get_point(lines, at)) for at in (0, -1)], 1)
-
-
-def _legs(lines: NDArray[np.object_]) -> FloatArray:
-    """First and last straight piece of each line, (lines, 2, 2); a person may have bent one."""
-    beside = np.stack([shapely.get_coordinates(shapely.get_point(lines, at)) for at in (1, -2)], 1)
-    ends = _ends(lines)
-    return np.stack((beside[:, 0] - ends[:, 0], ends[:, 1] - beside[:, 1]), axis=1)
-
-
-def _poses(
-    ends: FloatArray, legs: FloatArray, backward: NDArray[np.bool_]
-) -> tuple[FloatArray, FloatArray]:
-    """Poses at which one segment is left and the next is entered."""
-    # Driven backward, a line begins at its end, and the other way round.
-    ends = np.where(backward[:, None, None], ends[:, ::-1], ends)
-    way = np.arctan2(legs[..., 1], legs[..., 0])
-    way = np.where(backward[:, None], way[:, ::-1] + np.pi, way)
-    exits = np.column_stack((ends[:, 1], way[:, 1]))[:-1]
-    entries = np.column_stack((ends[:, 0], way[:, 0]))[1:]
-    return exits, entries
-
-
-def _spare(
-    lines: NDArray[np.object_], legs: FloatArray, track_no: IntArray, backward: NDArray[np.bool_]
-) -> FloatArray:
-    """What may be left out of the segments before and after each turn along one track.
-
-    Where a person bent a segment, it is left and joined on its straight pieces at the ends.
-    """
-    share = _SPARE_SHARE * shapely.length(lines)
-    spare = np.minimum(share[:, None], np.hypot(legs[..., 0], legs[..., 1]))
-    spare = np.where(backward[:, None], spare[:, ::-1], spare)
-    same = (track_no[1:] == track_no[:-1]) & (backward[1:] == backward[:-1])
-    return np.asarray(np.column_stack((spare[:-1, 1], spare[1:, 0])) * same[:, None])
 
 
 def _tables(
@@ -269,10 +218,7 @@ def _tables(
         lines,
         crs,
     )
-    if not there.all():
-        route = route[there].reset_index(drop=True)
-        table = table[there[1::2]].reset_index(drop=True)
-    return route, table
+    return route[there].reset_index(drop=True), table[there[1::2]].reset_index(drop=True)
 
 
 def _shortened(
@@ -280,12 +226,12 @@ def _shortened(
 ) -> NDArray[np.object_]:
     """The parts of lines from one length along them to another."""
     straight = shapely.get_num_coordinates(lines) == 2
-    ends = _ends(lines)
+    ends = places_of(lines)
     along = (ends[:, 1] - ends[:, 0]) / shapely.length(lines)[:, None]
     ends[:, 1] = ends[:, 0] + along * end[:, None]
     ends[:, 0] += along * begin[:, None]
     parts = np.empty(len(lines), dtype=object)
-    parts[straight] = shapely.linestrings(ends[straight]) if straight.any() else []
+    parts[straight] = shapely.linestrings(ends[straight])
     for at in np.flatnonzero(~straight):
         parts[at] = substring(lines[at], begin[at], end[at])
     return parts

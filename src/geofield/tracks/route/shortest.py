@@ -5,7 +5,9 @@ ends of each segment are neighbours for good. It is improved by exchanging links
 1958) and moving runs of segments (Or-opt, Or 1976) among near neighbours, then kicked and improved
 again a fixed number of times (Lourenco et al. 2003, "Iterated local search"), so that equal
 input gives equal output whatever the machine. The cost of a link is the length of its
-curve for the turning radius; what stands in between is priced for the nearest neighbours.
+curve for the turning radius, that of a blocked one a guess. The ways of the order that was found
+are then planned, their links cost what these are long, and the search goes on from there: what is
+kept is the shortest of the orders whose ways are known, the one to begin with among them.
 """
 
 from __future__ import annotations
@@ -16,50 +18,75 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from geofield.tracks.frame import FloatArray
-from geofield.tracks.route.curves import dubins_words, to_unit
+from geofield.tracks.route.curves import to_unit
 from geofield.tracks.route.passage import Passage
 from geofield.tracks.route.tour import improve_tour
+from geofield.tracks.route.turns import Turn, shortest_words
+from geofield.tracks.route.ways import Ways
 from geofield.tracks.shapes import IntArray
 
 _NEIGHBOURS = 12
 _BLOCKED_FACTOR = 1.5
 """A link that is blocked is priced as this many times its length, until its way is known."""
 _CRAMPED_RADII = 12.0
-"""And one from or to an end at which no turn can be begun as so many turning radii more."""
+"""And one from or to an end at which no turn can be begun as so many turning radii more,
+as one that the machine cannot drive."""
+_NO_WAY_M = 1e5
+_ROUNDS = 4
+"""Orders whose ways are looked up before the shortest of them is taken."""
 
 
 def shortest_order(
     ends: FloatArray,
     rows: IntArray,
     backward: NDArray[np.bool_],
-    passage: Passage,
+    ways: Ways,
     *,
-    radius_m: float | None,
     start: FloatArray | None,
 ) -> tuple[IntArray, NDArray[np.bool_]]:
     """Shorten the drive between segments; the new `rows` and `backward`.
 
     `ends` are both ends of each segment (segments, 2, 2), metres on the ground, `rows` and
-    `backward` the order to begin with; `radius_m` is for the cost of turning round, `start` where
-    the machine comes from.
+    `backward` the order to begin with, to which no longer one is preferred; `start` is where the
+    machine comes from.
     """
-    count = len(ends)
-    if count < 2:
+    total = 2 * len(ends)
+    if total < 4:
         return rows, backward
-    near, cost = _link_costs(ends, passage, radius_m)
     places = ends.reshape(-1, 2)
     begin = None if start is None else np.hypot(*(places - start).T).tolist()
-    tour = np.column_stack((2 * rows + backward, 2 * rows + ~backward)).ravel().tolist()
-    tour = improve_tour(
-        tour,
-        places.tolist(),
-        near,
-        cost,
-        detour_m=0.0 if radius_m is None else np.pi * radius_m,
-        begin=begin,
-    )
-    first = np.array(tour[0::2], dtype=np.int64)
-    return first // 2, (first % 2).astype(bool)
+    cost = _link_costs(ends, ways)
+    best, least, known = (rows, backward), np.inf, set[int]()
+    for left in reversed(range(_ROUNDS)):
+        price = [_price(turn, ways.radius_m or 0.0) for turn in ways.along(rows, backward)]
+        first, last = 2 * rows + backward, 2 * rows + ~backward
+        whole = sum(price) + (0.0 if begin is None else begin[first[0]])
+        if whole < least:
+            best, least = (rows, backward), whole
+        links, back = last[:-1] * total + first[1:], first[1:] * total + last[:-1]
+        cost.update(zip(back.tolist(), price, strict=True))
+        cost.update(zip(links.tolist(), price, strict=True))
+        if not left or known.issuperset(links.tolist()):
+            break
+        known.update(links.tolist())
+        tour = improve_tour(
+            np.column_stack((2 * best[0] + best[1], 2 * best[0] + ~best[1])).ravel().tolist(),
+            places.tolist(),
+            _nearest(cost, total),
+            cost,
+            detour_m=0.0 if ways.radius_m is None else np.pi * ways.radius_m,
+            begin=begin,
+        )
+        entered = np.array(tour[0::2], dtype=np.int64)
+        rows, backward = entered // 2, (entered % 2).astype(bool)
+    return best
+
+
+def _price(turn: Turn, radius_m: float) -> float:
+    """What a way counts for, metres."""
+    if turn.kind == "none":
+        return _NO_WAY_M
+    return turn.length_m + (0.0 if turn.fits else _CRAMPED_RADII * radius_m)
 
 
 def _cramped(
@@ -76,14 +103,12 @@ def _face_to_face(exits: FloatArray, entries: FloatArray) -> NDArray[np.bool_]:
     return np.asarray((np.abs(across) < 1e-3) & (along > 0.0))
 
 
-def _link_costs(
-    ends: FloatArray, passage: Passage, radius_m: float | None
-) -> tuple[list[list[int]], dict[int, float]]:
-    """Near neighbours of each end, and what driving to them costs.
+def _link_costs(ends: FloatArray, ways: Ways) -> dict[int, float]:
+    """What driving from each end (2 row, 2 row + 1) to its neighbours may cost.
 
-    For every end (2 row, 2 row + 1) the ends that are cheap to drive to, cheapest first; then a
-    dictionary from ``a * ends + b`` (both ways round) to metres.
+    From ``a * ends + b`` (both ways round) to metres.
     """
+    passage, radius_m = ways.passage, ways.radius_m
     places = ends.reshape(-1, 2)
     total = len(places)
     k = min(2 * _NEIGHBOURS + 2, total)
@@ -102,7 +127,7 @@ def _link_costs(
         leaving = np.column_stack((angle + np.pi, angle)).ravel()
         exits = np.column_stack((places[a], leaving[a]))
         entries = np.column_stack((places[b], leaving[b] + np.pi))
-        length = dubins_words(exits, entries, radius_m).total.min(axis=1) * radius_m
+        length = shortest_words(exits, entries, radius_m, ways.curve) * radius_m
         length += _cramped(places, leaving, passage, radius_m)[np.stack((a, b))].any(axis=0) * (
             _CRAMPED_RADII * radius_m * ~_face_to_face(exits, entries)
         )
@@ -111,10 +136,13 @@ def _link_costs(
     length = np.where(blocked, length * _BLOCKED_FACTOR, length)
     cost = dict(zip((a * total + b).tolist(), length.tolist(), strict=True))
     cost.update(zip((b * total + a).tolist(), length.tolist(), strict=True))
-    both_a, both_b = np.concatenate((a, b)), np.concatenate((b, a))
-    order = np.lexsort((np.concatenate((length, length)), both_a))
-    both_a, both_b = both_a[order], both_b[order]
-    first = np.searchsorted(both_a, np.arange(total + 1)).tolist()
-    listed = both_b.tolist()
-    near = [listed[first[e] : min(first[e + 1], first[e] + _NEIGHBOURS)] for e in range(total)]
-    return near, cost
+    return cost
+
+
+def _nearest(cost: dict[int, float], total: int) -> list[list[int]]:
+    """The ends that are cheap to drive to from each one, cheapest first."""
+    a, b = np.divmod(np.fromiter(cost, np.int64, len(cost)), total)
+    order = np.lexsort((b, np.fromiter(cost.values(), np.float64, len(cost)), a))
+    a, listed = a[order], b[order].tolist()
+    first = np.searchsorted(a, np.arange(total + 1)).tolist()
+    return [listed[first[e] : min(first[e + 1], first[e] + _NEIGHBOURS)] for e in range(total)]

@@ -107,12 +107,30 @@ class _Machine:
     curve: Curve
 
     def words(self, exits: FloatArray, entries: FloatArray) -> Words:
-        words = dubins_words if self.curve == "dubins" else reeds_shepp_words
-        return words(exits, entries, self.radius_m)
+        return _words(exits, entries, self.radius_m, self.curve)
 
     def trace(self, start: FloatArray, words: Words, row: int, word: int) -> FloatArray:
         steer, length = words.steer[word], words.length[row, word]
         return trace(start, steer, length, self.radius_m, step_m=_STEP_RADII * self.radius_m)
+
+
+def _words(exits: FloatArray, entries: FloatArray, radius_m: float, curve: Curve) -> Words:
+    words = dubins_words if curve == "dubins" else reeds_shepp_words
+    return words(exits, entries, radius_m)
+
+
+def _cost(words: Words) -> FloatArray:
+    """What each curve costs, radii."""
+    return words.total + _CUSP_RADII * words.cusps
+
+
+def shortest_words(
+    exits: FloatArray, entries: FloatArray, radius_m: float, curve: Curve
+) -> FloatArray:
+    """Length of the curve that is tried first for each pair of poses (n, 3), radii."""
+    words = _words(exits, entries, radius_m, curve)
+    total, first = words.total, np.argmin(_cost(words), axis=1)
+    return np.asarray(total[np.arange(len(first)), first])
 
 
 def _single_curves(
@@ -126,7 +144,7 @@ def _single_curves(
     """Try one curve for every pair, from the shortest word upwards, all pairs at a time."""
     passage, radius_m = machine.passage, machine.radius_m
     words = machine.words(exits, entries)
-    cost = words.total + _CUSP_RADII * words.cusps
+    cost = _cost(words)
     rank = np.argsort(cost, axis=1)
     wider = shapely.buffer(passage.open_shell, _NEAR_RADII * radius_m)
     shapely.prepare(wider)
@@ -139,8 +157,6 @@ def _single_curves(
         best = cost[open_rows, word]
         usable = np.isfinite(best) & (best - apart < limit)
         rows, word = open_rows[usable], word[usable]
-        if not len(rows):
-            break
         pairs = zip(rows.tolist(), word.tolist(), strict=True)
         places = [machine.trace(exits[row], words, row, w) for row, w in pairs]
         lines = np.array([as_line(each) for each in places], dtype=object)
@@ -154,7 +170,7 @@ def _single_curves(
                     places[at],
                     machine.curve if (pieces < 0).any() else "dubins",
                     float(np.abs(pieces).sum()),
-                    float(-pieces[pieces < 0].sum()),
+                    float(np.abs(pieces[pieces < 0]).sum()),
                     0.0 if inside[at] else passage.outside_m(lines[at]),
                     bool(inside[at]),
                 )
@@ -178,7 +194,7 @@ def _chain(start: FloatArray, goal: FloatArray, way: FloatArray, machine: _Machi
 def _through(poses: FloatArray, machine: _Machine) -> Turn | None:
     """The shortest curves through poses, where together they fit."""
     words = machine.words(poses[:-1], poses[1:])
-    cost = words.total + _CUSP_RADII * words.cusps
+    cost = _cost(words)
     best = np.argmin(cost, axis=1)
     if not np.isfinite(cost[np.arange(len(best)), best]).all():
         return None
@@ -187,7 +203,7 @@ def _through(poses: FloatArray, machine: _Machine) -> Turn | None:
     places = np.concatenate([parts[0], *(part[1:] for part in parts[1:])])
     if not machine.passage.fits(np.array([as_line(places)], dtype=object))[0]:
         return None
-    reverse = float(-pieces[pieces < 0].sum())
+    reverse = float(np.abs(pieces[pieces < 0]).sum())
     kind = "reeds_shepp" if reverse > 0.0 else "dubins"
     return Turn(places, kind, float(np.abs(pieces).sum()), reverse)
 
