@@ -7,6 +7,7 @@ import json
 import os
 import warnings
 from pathlib import Path
+from typing import Any
 
 import geopandas as gpd
 import numpy as np
@@ -15,12 +16,15 @@ import rasterio
 import shapely
 from click.testing import CliRunner
 from rasterio.warp import transform
+from shapely import Polygon
+from shapely.affinity import rotate
 
 from geofield.cli.main import cli
 from geofield.errors import FieldWarning
 from geofield.field import extract_field
 from geofield.imagery import read_scene
-from geofield.tracks import plan_tracks
+from geofield.tracks import longest_edge, plan_tracks
+from geofield.tracks.dominant import dominant_edge
 
 CRS = 32611
 SHARED = Path(os.environ.get("GEOFIELD_SHARED", Path(__file__).parents[2].parent / "shared"))
@@ -115,3 +119,21 @@ def test_a_meadow_photographed_in_three_years_is_worked_the_same_way() -> None:
         headings.append(tracks.heading_deg)
     turn = (np.subtract.outer(headings, headings) + 90.0) % 180.0 - 90.0
     assert np.abs(turn).max() < 3.0, headings
+
+
+@pytest.mark.parametrize("find", [longest_edge, lambda outline: dominant_edge(outline)[0]])
+def test_a_vertex_more_or_one_twice_leaves_the_edge_where_it_is(find: Any) -> None:
+    """Of two sides as long the one of fewer vertices counted; a vertex twice bent the direction."""
+    for turned_deg in (0, 20, 50, 140):
+        ring = shapely.get_coordinates(rotate(shapely.box(0, 0, 100, 60), turned_deg))[:-1]
+        edge = find(Polygon(ring))
+        for at in range(4):
+            for share in (0.0, 0.3, 0.5):
+                more = (1.0 - share) * ring[at] + share * ring[(at + 1) % 4]
+                other = find(Polygon(np.insert(ring, at + 1, more, axis=0)))
+                assert np.hypot(other.x0 - edge.x0, other.y0 - edge.y0) < 1e-6
+                assert np.hypot(other.x1 - edge.x1, other.y1 - edge.y1) < 1e-6
+    stairs = np.array([[0, 0], [60, 0], [60, 20.3], [62, 41], [20, 60], [0, 61.0]])
+    edge = find(Polygon(stairs))
+    for at in range(6):
+        assert find(Polygon(np.insert(stairs, at, stairs[at], axis=0))) == edge

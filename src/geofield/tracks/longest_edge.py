@@ -72,7 +72,9 @@ def own_edges(
     polygon: Polygon, tolerance: float, outside: Sequence[LineString]
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Vertices of the outer ring, and which edges from them are the picture's."""
-    ring = shapely.get_exterior_ring(shapely.orient_polygons(polygon))
+    # An edge of no length would run to the east.
+    ring = shapely.remove_repeated_points(polygon.exterior)
+    ring = shapely.get_exterior_ring(shapely.orient_polygons(Polygon(ring)))
     # Of edges that are as long the first one counts, whichever vertex a file begins with.
     xy = shapely.get_coordinates(ring)[:-1]
     first = int(np.lexsort((xy[:, 1].round(3), -xy[:, 0].round(3)))[0])
@@ -157,7 +159,8 @@ def _longest_run(xy: FloatArray, tolerance: float, barred: NDArray[np.bool_]) ->
         if good.any():
             lengths = np.where(good, distance, -1.0).round(6)
             top = int(np.argmax(lengths))
-            if lengths[top] > best_length:
+            # Of equals the first one, whatever vertices lie along each.
+            if (lengths[top], -active[top]) > (best_length, -best_first):
                 best_length, best_first, best_count = float(lengths[top]), int(active[top]), step
         reach[active] = np.maximum(reach[active], distance)
         far = active[~near]
