@@ -13,6 +13,7 @@ from shapely import Polygon, affinity
 
 from geofield.model.tracks import Tracks
 from geofield.tracks import plan_route, plan_tracks
+from geofield.tracks.headland import inset
 
 pytestmark = pytest.mark.filterwarnings("ignore::geofield.errors.GeofieldWarning")
 #: Units of the CRS that a plan may be off by the rounding of coordinates in the millions.
@@ -153,6 +154,15 @@ def test_nothing_that_can_be_driven_is_left_out(cases: list[Case]) -> None:
             long = shapely.length(parts) / tracks.ground_scale > max(least_m, 0.05)
             left = shapely.length(parts[long]).sum() - shapely.length(mine).sum()
             assert abs(left) < 0.02 * (1 + long.sum())
+
+
+def test_a_headland_does_not_depend_on_the_vertex_that_an_outline_begins_with() -> None:
+    for seed in (3, 33, *range(4, 10)):
+        ring = shapely.get_coordinates(any_field(np.random.default_rng(seed)).exterior)[:-1]
+        begun = [np.roll(ring, -at, axis=0) for at in (0, len(ring) // 3, len(ring) // 2)]
+        left = [inset(Polygon(each), 14.0) for each in (*begun, ring[::-1])]
+        # By 4.5 square metres of the first one, and tracks by metres.
+        assert np.ptp(shapely.area(left)) < 0.01
 
 
 def test_gaps_lie_between_segments_and_name_what_is_in_them(cases: list[Case]) -> None:

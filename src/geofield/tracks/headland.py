@@ -33,7 +33,8 @@ def inset(outline: Polygon, width: float, *, holes: bool = False) -> BaseGeometr
     With `holes` the strip runs around them too; otherwise they stay as they are. Empty where the
     field is nowhere wider than twice the width.
     """
-    moved = outline if holes else Polygon(outline.exterior)
+    # Corners depend a little on the vertex that GEOS begins at: it passes over others beside it.
+    moved = shapely.normalize(outline if holes else Polygon(outline.exterior))
     plain = shapely.simplify(moved, _STANDS_OUT_M, preserve_topology=False)
     tried = shapely.buffer(
         plain if plain.is_valid and not plain.is_empty else moved,
