@@ -356,6 +356,25 @@ def test_turns_keep_to_the_ground_and_to_the_turning_radius(drives: list[Drive])
     assert fitting > 150 or drives[0].radius_m is None
 
 
+def test_metres_driven_backwards_are_those_between_cusps(drives: list[Drive]) -> None:
+    most_m = 0.0
+    for drive in drives:
+        route, turns, scale = drive.route, drive.turns, drive.case.tracks.ground_scale
+        before = route.set_index("sequence").geometry.loc[turns["sequence"] - 1]
+        for turn, work in zip(turns.itertuples(), before, strict=True):
+            assert (turn.reverse_m > 0.0) == (turn.kind == "reeds_shepp")
+            if turn.kind == "drive":
+                continue
+            last, steps = (np.diff(line.coords, axis=0) for line in (work, turn.geometry))
+            runs = np.concatenate((last[-1:], steps))
+            heading = np.unwrap(np.arctan2(runs[:, 1], runs[:, 0]), period=2 * np.pi)
+            cusps = np.cumsum(np.abs(np.diff(heading)) > 0.7 * np.pi)
+            backward_m = np.hypot(*steps.T)[cusps % 2 == 1].sum() / scale
+            assert backward_m == pytest.approx(turn.reverse_m, rel=1e-2, abs=1e-2)
+            most_m = max(most_m, backward_m)
+    assert most_m > 1.0 or drives[0].radius_m is None
+
+
 def least_radius(way: Any) -> float:
     """Of the bends of a line, but for the cusps where a machine reverses, units of the CRS."""
     steps = np.diff(shapely.get_coordinates(way), axis=0)

@@ -400,6 +400,31 @@ def test_curves_follow_the_shortest_way_around_what_no_single_curve_clears(radiu
     assert shortest_m < turn.length_m < 1.04 * shortest_m
 
 
+@pytest.mark.parametrize(
+    "walls", [[(18, -3, 22, 12)], [(18, -3, 20, 14), (30, -14, 32, 3)], [(15, -5, 28, 9)]]
+)
+def test_curves_follow_the_shortest_way_around_corners_whatever_its_heading(walls: Any) -> None:
+    for turned_deg in (0, 40, 100, 200, 320):
+        for mirror in (1, -1):
+
+            def placed(shape: Any, turned: float = turned_deg, mirror: int = mirror) -> Any:
+                mirrored = affinity.scale(shape, 1, mirror, origin=(0, 0))
+                return affinity.rotate(mirrored, turned, origin=(0, 0))
+
+            solid = np.array([placed(shapely.box(*wall)) for wall in walls], dtype=object)
+            none = np.empty((0, 3)), np.empty(0, int)
+            shapes = ObstacleShapes(*none, solid, np.arange(len(walls)))
+            passage = Passage(placed(shapely.box(-60, -60, 120, 60)), shapes)
+            ends = [np.array(placed(shapely.Point(x, 0)).coords[0]) for x in (0, 50)]
+            out, into = (np.append(end, np.radians(turned_deg))[None] for end in ends)
+            spare = np.zeros((1, 2))
+            (turn,) = plan_turns(out, into, passage, radius_m=3.0, curve="dubins", spare_m=spare)
+            shortest = passage.shortest(*ends)
+            assert shortest is not None
+            assert turn.fits
+            assert turn.length_m < 1.03 * shapely.LineString(shortest).length
+
+
 @pytest.mark.parametrize("radius_m", [6.0, 10.0])
 def test_a_track_is_left_early_and_joined_late_where_a_tree_is_too_near(radius_m: float) -> None:
     turn, _, shortest_m = past_a_tree(radius_m, before_m=0.5, spare_m=0.0)
