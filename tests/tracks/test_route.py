@@ -366,7 +366,7 @@ def test_vertices_along_a_straight_border_are_no_corners_to_turn_at() -> None:
 
 
 def past_a_tree(
-    radius_m: float, before_m: float, spare_m: float
+    radius_m: float, before_m: float, spare_m: float | tuple[float, float]
 ) -> tuple[Turn, shapely.LineString, float]:
     """The turn of a machine of 4 m past a tree on its track, its way, the shortest way's length."""
     circle, no = np.array([[20.0, 0.0, radius_m]]), np.empty(0, object)
@@ -441,6 +441,10 @@ def test_a_track_is_left_early_and_joined_late_where_a_tree_is_too_near(radius_m
         turn, _, _ = past_a_tree(radius_m, before_m=0.5, spare_m=spare_m)
         assert max(turn.early_m, turn.late_m) <= spare_m
         assert turn.fits == (turn.early_m > 0)
+    for early_m, late_m in ((40.0, 1.0), (1.0, 40.0)):
+        turn, _, _ = past_a_tree(radius_m, before_m=0.5, spare_m=(early_m, late_m))
+        assert turn.early_m <= early_m
+        assert turn.late_m <= late_m
 
 
 @pytest.mark.parametrize(("bend_m", "fits"), [(1.0, "no"), (12.0, "yes"), (20.0, "yes")])
