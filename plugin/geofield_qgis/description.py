@@ -56,6 +56,11 @@ def label_of(row: dict[str, Any]) -> str:
     return f"{label} ({unit})" if unit else label
 
 
+def said(language: str) -> list[tuple[str, str]]:
+    """Sentences of the engine, as patterns, and what they are in another language."""
+    return [tuple(row) for row in _all()["said"].get(language, ())]
+
+
 def formats() -> list[str]:
     """Names of the formats that a plan can be written in."""
     return [row["name"] for row in _all()["formats"]]

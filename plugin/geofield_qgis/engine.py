@@ -248,7 +248,7 @@ class Reader:
         elif "error" in told:
             self._error = told["error"]
         elif line:
-            self._lines.append(told.get("note", line))
+            self._lines.append(tr(told.get("note", line)))
             self._on_line(self._lines[-1])
 
     @property
@@ -276,8 +276,8 @@ class Reader:
 
 
 def said(error: Mapping[str, str]) -> str:
-    """An error in the engine's own words, with what to do."""
-    return " ".join(part for part in (error["message"], error.get("hint")) if part)
+    """An error of the engine, with what to do."""
+    return " ".join(tr(part) for part in (error["message"], error.get("hint")) if part)
 
 
 def _as_object(line: str) -> dict[str, Any]:

@@ -76,8 +76,8 @@ class ReviewLabels(QWidget):
         if certainty is not None:
             text += tr(", outline {0:.0%} certain").format(certainty)
         self.title.setText(text)
-        outline = [value(row, "doubts")] if value(row, "doubts") else []
-        self._show_doubts([*outline, *self._obstacle_doubts])
+        outline = (value(row, "doubts") or "").split("; ")
+        self._show_doubts(["; ".join(map(tr, outline)), *map(tr, self._obstacle_doubts)])
 
     def tell_figures(self, answer: Mapping[str, Any]) -> None:
         """Tell of tracks that the engine planned."""
@@ -85,12 +85,12 @@ class ReviewLabels(QWidget):
         text = tr("Tracks: {0}, segments: {1}, {2} km").format(
             figures["tracks"], figures["segments"], number(figures["length_m"] / 1000, 2)
         )
-        self.figures.setText("\n".join([text, *answer.get("notes", [])]))
+        self.figures.setText("\n".join([text, *map(tr, answer.get("notes", []))]))
         self._obstacle_doubts = answer.get("doubts", [])
 
     def _show_doubts(self, doubts: list[str]) -> None:
-        self.doubts.setText("\n".join(doubts))
-        self.doubts.setVisible(bool(doubts))
+        self.doubts.setText("\n".join(filter(None, doubts)))
+        self.doubts.setVisible(any(doubts))
 
 
 def _said(status: str) -> str:

@@ -261,6 +261,16 @@ def spoken(language):
     }
 
 
+def told(language, texts):
+    """What the plugin says for what the engine said."""
+    from geofield_qgis.words import Words, tr
+    from qgis.PyQt.QtCore import QCoreApplication
+
+    words = Words(language)
+    QCoreApplication.installTranslator(words)
+    return [tr(each) for each in texts]
+
+
 def web_layers(addresses):
     """How web layers are told to the command."""
     from geofield_qgis import sources
@@ -337,6 +347,7 @@ ACTIONS = {
     "web_layers": web_layers,
     "install": install,
     "spoken": spoken,
+    "told": told,
     "several": several,
 }
 

@@ -320,6 +320,22 @@ def routed(plan):
     return answer
 
 
+def in_german(plan, doubts):
+    """What the panel of a German QGIS says of an outline, its doubts and its tracks."""
+    from geofield_qgis.words import Words
+
+    words = Words("de")
+    QgsApplication.installTranslator(words)
+    layers, dock = reviewed(plan)
+    field = layers["field"]
+    where = field.fields().indexFromName("doubts")
+    row = next(field.getFeatures()).id()
+    field.dataProvider().changeAttributeValues({row: {where: doubts}})
+    dock.open(plan)
+    settled(dock)
+    return {"doubts": dock.labels.doubts.text(), "figures": dock.labels.figures.text()}
+
+
 def clicks(picture, lon, lat, home):
     """A click whose message is closed, one with Shift in another CRS, one that is stopped."""
     from geofield_qgis.planner import Planner
@@ -352,7 +368,7 @@ def clicks(picture, lon, lat, home):
 
 _ALL = (
     saved_with_edits, filtered, read_only, without_radius, project_saved_meanwhile, discarded,
-    tools, keys, undone, redone, routed, clicks,
+    tools, keys, undone, redone, routed, in_german, clicks,
 )  # fmt: skip
 ACTIONS = {each.__name__: each for each in _ALL}
 

@@ -15,6 +15,8 @@ from pathlib import Path
 import pytest
 from plugin_place import PLUGINS, ROOT
 
+from told_notes import notes_of_tracks
+
 sys.path.insert(0, str(PLUGINS))
 import translate
 
@@ -139,3 +141,20 @@ def test_german_is_spoken(qgis):
         "theirs": "%1 [optional]",  # QGIS's own words: they were blank in every dialogue
         "still_english": [],
     }
+
+
+def test_what_the_engine_says_is_german_as_on_the_review_page(qgis):
+    """Doubts, notes and refusals were English in a panel that was German otherwise."""
+    notes = notes_of_tracks()
+    told = qgis("told", language="de", texts=notes)
+    assert [text for text in told if text in notes] == []
+    assert "Wege zwischen Abschnitten" in " ".join(told)
+    assert re.findall(r"\d+\.\d+", " ".join(told)) == []
+    some = {
+        "field.2.gpkg is there already.": "field.2.gpkg gibt es schon.",
+        "It has 1.5 m. Choose another name.": "It has 1.5 m. Wählen Sie einen anderen Namen.",
+        "it is only 1.5 m wide (a way?)": "es ist nur 1,5 m breit (ein Weg, ein Streifen?)",
+        "Another tab is editing this plan.": "Another tab is editing this plan.",
+    }
+    assert dict(zip(some, qgis("told", language="de", texts=list(some)), strict=True)) == some
+    assert qgis("told", language="fr", texts=list(some)) == list(some)

@@ -99,6 +99,18 @@ def test_the_route_before_the_edits_is_not_shown_until_they_are_saved(panel, pla
     assert shown == [True, True, True]
 
 
+def test_doubts_and_notes_are_german_in_a_german_qgis(panel, plan, geofield):
+    geofield("tracks", plan, "--spacing", 6, "--width", 4, "-o", plan, "--overwrite")
+    doubts = "it is only 9.5 m wide (a way?); much of its course is crooked"
+    seen = panel("in_german", plan=plan, doubts=doubts)
+    assert seen["doubts"].split("; ") == [
+        "es ist nur 9,5 m breit (ein Weg, ein Streifen?)", "vieles an seinem Verlauf ist krumm",
+    ]  # fmt: skip
+    figures, *notes = seen["figures"].splitlines()
+    assert figures.startswith("Spuren: ")
+    assert notes[0].startswith("Zwischen den Spuren bleiben 2,00 m unbearbeitet: ")
+
+
 def test_clicks_go_on_whatever_becomes_of_message_and_map(panel, tmp_path):
     # What is in the way of a folder beside the project: nothing can be written there.
     (tmp_path / "geofield").write_text("")

@@ -15,32 +15,28 @@ from contextlib import closing
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import cast, get_args
 
 import geopandas as gpd
 import pytest
 import shapely
 from axe_core_python.selenium import Axe
 from browser import Page, chromium, served
-from pyproj import CRS
 from selenium import webdriver
 from selenium.common.exceptions import NoAlertPresentException
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from shapely import Polygon
-from shapely.geometry.base import BaseGeometry
 
-from geofield.errors import TrackError, TrackWarning
+from geofield.errors import TrackWarning
 from geofield.model.evidence import Evidence
-from geofield.model.searched import unsearched
-from geofield.notes import listening
 from geofield.plan import read_plan
 from geofield.plan_files import save_plan
 from geofield.review import Session
 from geofield.settings import DirectionName
-from geofield.tracks import plan_route, plan_tracks
 from geofield_command import run_geofield
+from told_notes import notes_of_tracks
 
 GEOFIELD = str(Path(sys.executable).with_name("geofield"))
 pytestmark = [pytest.mark.slow, pytest.mark.browser, pytest.mark.xdist_group("review")]
@@ -765,36 +761,7 @@ def test_what_is_told_together_is_all_in_german(page: Page, plan_path: Path) -> 
 
 
 def test_notes_of_tracks_are_in_german(page: Page) -> None:
-    square, wall = shapely.box(0, 0, 100, 60), shapely.box(48, -5, 52, 65)
-    ring = shapely.Point(50, 30).buffer(20).difference(shapely.Point(50, 30).buffer(15))
-    asked: list[tuple[list[BaseGeometry], dict[str, Any]]] = [
-        ([ring], {"spacing_m": 5}),
-        ([], {"spacing_m": 6, "width_m": 4}),
-        ([], {"spacing_m": 6, "headland_m": 9}),
-        ([], {"spacing_m": 90, "last_strip": "leave"}),
-        ([square.buffer(1)], {"spacing_m": 5}),
-    ]
-    with listening() as heard:
-        for obstacles, settings in asked:
-            plan_tracks(square, obstacles, crs=32636, direction=90, **settings)
-        parted = plan_tracks(square, [wall], crs=32636, spacing_m=6, headland_m=12)
-        plan_route(parted)
-        plan_route(plan_tracks(square, crs=32636, spacing_m=30), pattern="skip")
-        bowtie = shapely.Polygon([(40, 20), (60, 30), (60, 20), (40, 30)])
-        for odd in ([bowtie], [bowtie, bowtie], [shapely.Point()], [shapely.Point()] * 2):
-            plan_tracks(square, odd, crs=32636, spacing_m=9)
-    notes = [str(note) for note in heard]
-    assert len(set(notes)) >= 11
-    refused: list[dict[str, Any]] = [
-        {"spacing_m": 1e-4},
-        {"spacing_m": 0.01, "step_m": 0.01},
-        {"spacing_m": 9, "offset_m": 150},
-    ]
-    for settings in refused:
-        with pytest.raises(TrackError) as error:
-            plan_tracks(square, crs=32636, **settings)
-        notes.append(error.value.message)
-    notes.append(unsearched("POLYGON EMPTY", square, CRS(32636)))
+    notes = notes_of_tracks()
     page.run("localStorage.setItem('language', 'de')")
     page.driver.refresh()
     told = page.driver.execute_async_script(

@@ -89,12 +89,16 @@ export function t(name, values = {}) {
 // As it stands on a keyboard of the language.
 export const keyName = keys => keys.split("+").map(key => t(key)).join("+");
 
+const SENTENCES = Object.fromEntries(Object.keys(WORDS).map(name => [
+  name, [...(SAID.page[name] ?? []), ...(SAID[name] ?? [])].map(([pattern, text]) => [new RegExp(`^${pattern}$`), text]),
+]));
+
 // What the program says, where it is known in the page's language: as a whole, or its sentences.
 export function told(text) {
   const sentences = text.split(/(?<=\.) (?=[A-Z])/);
   for (let n = sentences.length; n > 0; n--) {
     const first = sentences.slice(0, n).join(" "), rest = sentences.slice(n).join(" ");
-    const found = SAID[language]?.find(([pattern]) => pattern.test(first));
+    const found = SENTENCES[language].find(([pattern]) => pattern.test(first));
     if (found) return [local(first.replace(...found)), ...(rest ? [told(rest)] : [])].join(" ");
   }
   return sentences.length < 2 ? text : `${sentences[0]} ${told(sentences.slice(1).join(" "))}`;
