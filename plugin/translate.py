@@ -16,9 +16,12 @@ PLUGIN = Path(__file__).parent / "geofield_qgis"
 sys.path.insert(0, str(PLUGIN))
 import description  # noqa: E402
 
+from geofield import schema  # noqa: E402
+from geofield.formats.qgis.looks import LOOKS  # noqa: E402
+
 
 def texts() -> dict[str, str]:
-    """Every text that a person may read, and the file it stands in."""
+    """Every text that a person may read, and the file that shows it."""
     found: dict[str, str] = {}
     for file in sorted(PLUGIN.glob("*.py")):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
@@ -34,6 +37,9 @@ def texts() -> dict[str, str]:
         found.setdefault(description.label_of(row), "description.py")
         if row["description"]:
             found.setdefault(row["description"], "description.json")
+    for layer in (*schema.LAYERS, schema.PLACES):
+        for text in (layer.title, *(rule.label for rule in LOOKS[layer.name].rules)):
+            found.setdefault(text, "results.py")
     return found
 
 

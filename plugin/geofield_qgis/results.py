@@ -16,10 +16,13 @@ from qgis.core import (
     QgsProject,
     QgsRasterLayer,
     QgsReadWriteContext,
+    QgsRuleBasedRenderer,
     QgsVectorLayer,
 )
 from qgis.PyQt.QtCore import QBuffer, QIODevice, QMetaObject, Qt
 from qgis.PyQt.QtXml import QDomDocument
+
+from .words import tr
 
 #: Kept alive until QGIS has shown the layers: it holds no reference of its own.
 _WAITING: list[Placing] = []
@@ -127,6 +130,7 @@ def group_of(project: QgsProject, plan: Path, title: str) -> QgsLayerTreeGroup:
 
 def place_layer(layer: QgsMapLayer, group: QgsLayerTreeGroup, place: int, shown: bool) -> None:
     """Put a layer into a group; a lower place is nearer to the top."""
+    _speak(layer)
     layer.setCustomProperty("geofield/place", place)
     root = group
     while root.parent() is not None:
@@ -144,6 +148,16 @@ def place_layer(layer: QgsMapLayer, group: QgsLayerTreeGroup, place: int, shown:
     node.setExpanded(False)
     if old is not None:
         (old.parent() or root).removeChildNode(old)
+
+
+def _speak(layer: QgsMapLayer) -> None:
+    """Show a layer's name and legend in the language of QGIS; its file stays as it is."""
+    layer.setName(tr(layer.name()))
+    if isinstance(layer, QgsVectorLayer) and isinstance(layer.renderer(), QgsRuleBasedRenderer):
+        renderer = layer.renderer().clone()
+        for rule in renderer.rootRule().children():
+            rule.setLabel(tr(rule.label()))
+        layer.setRenderer(renderer)
 
 
 def load_on_completion(plan: str | Path, context: QgsProcessingContext) -> None:

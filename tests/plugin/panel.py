@@ -321,7 +321,7 @@ def routed(plan):
 
 
 def in_german(plan, doubts):
-    """What the panel of a German QGIS says of an outline, its doubts and its tracks."""
+    """What the panel of a German QGIS says of a plan, and how its layers are shown."""
     from geofield_qgis.words import Words
 
     words = Words("de")
@@ -333,7 +333,15 @@ def in_german(plan, doubts):
     field.dataProvider().changeAttributeValues({row: {where: doubts}})
     dock.open(plan)
     settled(dock)
-    return {"doubts": dock.labels.doubts.text(), "figures": dock.labels.figures.text()}
+    obstacles = layers["obstacles"]
+    return {
+        "doubts": dock.labels.doubts.text(),
+        "figures": dock.labels.figures.text(),
+        "layers": [each.name() for each in layers.values()],
+        "legend": [each.label() for each in obstacles.renderer().legendSymbolItems()],
+        "styled": obstacles.loadDefaultStyle()[1],
+        "in_file": [each.label() for each in obstacles.renderer().legendSymbolItems()],
+    }
 
 
 def clicks(picture, lon, lat, home):

@@ -99,7 +99,7 @@ def test_the_route_before_the_edits_is_not_shown_until_they_are_saved(panel, pla
     assert shown == [True, True, True]
 
 
-def test_doubts_and_notes_are_german_in_a_german_qgis(panel, plan, geofield):
+def test_doubts_notes_and_legend_are_german_in_a_german_qgis(panel, plan, geofield):
     geofield("tracks", plan, "--spacing", 6, "--width", 4, "-o", plan, "--overwrite")
     doubts = "it is only 9.5 m wide (a way?); much of its course is crooked"
     seen = panel("in_german", plan=plan, doubts=doubts)
@@ -109,6 +109,11 @@ def test_doubts_and_notes_are_german_in_a_german_qgis(panel, plan, geofield):
     figures, *notes = seen["figures"].splitlines()
     assert figures.startswith("Spuren: ")
     assert notes[0].startswith("Zwischen den Spuren bleiben 2,00 m unbearbeitet: ")
+    # The legend, too; in the file it is as others open it.
+    assert {"Feld", "Hindernisse", "Fahrspuren", "Bild"} <= set(seen["layers"])
+    assert seen["legend"][:2] == ["Bestätigt", "Gefunden"]
+    assert seen["styled"]
+    assert seen["in_file"][:2] == ["Confirmed", "Detected"]
 
 
 def test_clicks_go_on_whatever_becomes_of_message_and_map(panel, tmp_path):

@@ -476,7 +476,7 @@
     <message>
       <location filename="planner.py" />
       <source>Tracks: {0}, {1} km. Shift+click adds ground, Alt+click takes it away.</source>
-      <translation>Spuren: {0}, {1} km. Umschalt+Klick nimmt Boden dazu, Alt+Klick nimmt ihn weg.</translation>
+      <translation>Spuren: {0}, {1} km. Umschalt+Klick nimmt Boden dazu, Alt+Klick weg.</translation>
     </message>
     <message>
       <location filename="review.py" />
@@ -2032,6 +2032,131 @@
       <location filename="description.json" />
       <source>Column of PLACES with the lon; usual names are found.</source>
       <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Field</source>
+      <translation>Feld</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Outline</source>
+      <translation>Feldgrenze</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Outline to be checked</source>
+      <translation>Zweifelhafte Feldgrenze</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Field to be checked</source>
+      <translation>Zweifelhaftes Feld</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Obstacles</source>
+      <translation>Hindernisse</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Confirmed</source>
+      <translation>Bestätigt</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Possible, not avoided</source>
+      <translation>Möglich, nicht umfahren</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Added by a person</source>
+      <translation>Von Hand ergänzt</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Rejected by a person</source>
+      <translation>Von Hand verworfen</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Tracks</source>
+      <translation>Fahrspuren</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Track</source>
+      <translation>Fahrspur</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Segments</source>
+      <translation>Abschnitte</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Segment</source>
+      <translation>Abschnitt</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Gaps</source>
+      <translation>Lücken</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Gap</source>
+      <translation>Lücke</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Track points</source>
+      <translation>Spurpunkte</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Track point</source>
+      <translation>Spurpunkt</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Headland</source>
+      <translation>Vorgewende</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Headland tracks</source>
+      <translation>Fahrspuren im Vorgewende</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Headland track</source>
+      <translation>Fahrspur im Vorgewende</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Turns</source>
+      <translation>Wendungen</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Turn</source>
+      <translation>Wendung</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Turn that does not fit</source>
+      <translation>Wendung, die nicht passt</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Outline that may be meant</source>
+      <translation>Mögliche Feldgrenze</translation>
+    </message>
+    <message>
+      <location filename="results.py" />
+      <source>Place without a plan</source>
+      <translation>Ort ohne Plan</translation>
     </message>
   </context>
 </TS>
