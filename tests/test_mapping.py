@@ -195,18 +195,33 @@ def test_letters_beyond_english_are_no_boxes(plan: Plan) -> None:
 
 def test_without_any_other_font_accents_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(map_fonts, "_OTHERS", ())
-    text, _ = map_fonts.written(
+    pieces = map_fonts.written(
         "Gro\N{LATIN SMALL LETTER SHARP S}e Pr\N{LATIN SMALL LETTER E WITH ACUTE}s", 14
     )
-    assert text == "Grosse Pres"
-    assert map_fonts.written("Long meadow, 3.62 ha", 14)[0] == "Long meadow, 3.62 ha"
+    assert "".join(text for text, _ in pieces) == "Grosse Pres"
+    assert [text for text, _ in map_fonts.written("Long meadow, 3 ha", 14)] == ["Long meadow, 3 ha"]
 
 
 def test_one_letter_that_no_font_has_costs_the_others_nothing() -> None:
-    alone, own = map_fonts.written("M\N{LATIN SMALL LETTER U WITH DIAERESIS}hle", 14)
-    text, font = map_fonts.written(f"{alone} \U0010fffd", 14)
-    assert text.startswith(alone)
+    name = "M\N{LATIN SMALL LETTER U WITH DIAERESIS}hle "
+    ((_, own),) = map_fonts.written(name, 14)
+    (text, font), _ = map_fonts.written(f"{name}\U0010fffd", 14)
+    assert text == name
     assert font.getname() == own.getname()
+
+
+def test_each_letter_is_drawn_by_a_font_that_has_it() -> None:
+    """Of "Straße", a space and a sign of Chinese one was a box: a line had one font."""
+    sign = "田"
+    name = f"Straße {sign} 3,62 ha"
+    if not any(map_fonts._has(each, sign) for each in map_fonts._fonts(14)):
+        pytest.skip("needs a font of Chinese: apt-get install fonts-droid-fallback")
+    pieces = map_fonts.written(name, 14)
+    assert "".join(text for text, _ in pieces) == name
+    for text, font in pieces:
+        box_px = font.getmask("￿")
+        for letter in text.replace(" ", ""):
+            assert bytes(font.getmask(letter)) != bytes(box_px), letter
 
 
 @pytest.mark.parametrize("width_m", [12.0, 150.0])

@@ -6,12 +6,12 @@ others.
 
 from __future__ import annotations
 
-import math
 import unicodedata
 from collections.abc import Iterator
 from functools import cache
 
 from PIL import ImageFont
+from PIL.ImageDraw import ImageDraw
 from PIL.ImageFont import FreeTypeFont
 
 #: Where other letters are, on Linux, macOS and Windows; found by Pillow in their usual folders.
@@ -38,19 +38,38 @@ _PLAIN = str.maketrans(
 )
 
 
-def written(text: str, size_px: int) -> tuple[str, FreeTypeFont]:
-    """A text and the font of a size that has most of its letters.
+def written(text: str, size_px: int) -> list[tuple[str, FreeTypeFont]]:
+    """A text as pieces, each with the font that has most of the letters from there on.
 
-    Letters with accents that it lacks are written without; others stay boxes.
+    Letters that no font has are written without their accents, else they stay boxes.
     """
-    fewest: float = math.inf
-    for each in _fonts(size_px):
-        lacking = {letter for letter in text if not _has(each, letter)}
-        if len(lacking) < fewest:
-            font, missing, fewest = each, lacking, len(lacking)
-        if not lacking:
-            break
-    return "".join(_plain(each) if each in missing else each for each in text), font
+    pieces = []
+    while text:
+        font, count = _own(size_px), 0
+        for each in _fonts(size_px):
+            far = next((at for at, letter in enumerate(text) if not _has(each, letter)), len(text))
+            if far > count:
+                font, count = each, far
+            if far == len(text):
+                break
+        pieces.append((text[:count] or _plain(text[0]), font))
+        text = text[max(count, 1) :]
+    return pieces
+
+
+def length_px(text: str, size_px: int) -> float:
+    """How wide a text is."""
+    return sum(font.getlength(piece) for piece, font in written(text, size_px))
+
+
+def write(
+    draw: ImageDraw, at: tuple[float, float], text: str, size_px: int, ink: tuple[int, ...]
+) -> None:
+    """Write a text from a place on its baseline to the right."""
+    x, y = at
+    for piece, font in written(text, size_px):
+        draw.text((x, y), piece, ink, font, "ls")
+        x += font.getlength(piece)
 
 
 def _plain(letter: str) -> str:
@@ -84,7 +103,7 @@ def _installed(name: str, size_px: int) -> FreeTypeFont | None:
 @cache
 def _has(font: FreeTypeFont, letter: str) -> bool:
     """Whether a letter is not drawn as the box of what no font has."""
-    if letter.isspace() or letter.isascii():
+    if letter.isspace():
         return True
     mask, box = font.getmask(letter), font.getmask("\uffff")
     return mask.size != box.size or bytes(mask) != bytes(box)

@@ -17,7 +17,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from geofield import theme
 from geofield.grid import Grid
-from geofield.mapping.fonts import written
+from geofield.mapping.fonts import length_px, write
 from geofield.model.dataset import Dataset
 from geofield.model.map_words import (
     credit_in_words,
@@ -32,14 +32,14 @@ from geofield.model.map_words import (
 Colour = tuple[int, ...]
 #: Line and space, pixels.
 Dash = tuple[float, float]
-_Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 
 #: Where an outline is the picture's frame.
 FRAME_DASH = (9.0, 7.0)
 INK: Colour = (255, 255, 255, 255)
 GROUND: Colour = (70, 74, 70)
 _PANEL: Colour = (20, 24, 28, 215)
-_DOUBT_SIZE = 14
+#: From the middle of a line down to where its letters stand.
+_DOWN_PX = 5
 #: A map of a narrower field has plain ground on both sides: its panel needs room for words.
 _NARROWEST_PX = 560
 
@@ -52,17 +52,13 @@ def with_panel(picture: Image.Image, dataset: Dataset, grid: Grid, scale: float)
     legend_right = 16 + step * math.ceil(len(entries) / rows)
     # The first one holds the field's name.
     sizes = itertools.chain([16], itertools.repeat(14))
-    figures = list(map(written, figures_in_words(dataset), sizes))
-    beside = legend_right + max(font.getlength(text) for text, font in figures) + 16 <= width
+    figures = list(zip(figures_in_words(dataset), sizes, strict=False))
+    beside = legend_right + max(length_px(text, size) for text, size in figures) + 16 <= width
     below = (
-        [] if beside else [(t, font) for text, font in figures for t in _wrapped(text, font, width)]
+        [] if beside else [(t, size) for text, size in figures for t in _wrapped(text, size, width)]
     )
-    doubt_font = ImageFont.load_default(_DOUBT_SIZE)
-    doubts = [
-        line for told in doubts_in_words(dataset) for line in _wrapped(told, doubt_font, width)
-    ]
-    credit, credit_font = written(credit_in_words(dataset), 12)
-    owners = _wrapped(credit, credit_font, width)
+    doubts = [line for told in doubts_in_words(dataset) for line in _wrapped(told, 14, width)]
+    owners = _wrapped(credit_in_words(dataset), 12, width)
     legend_height = 26 + 22 * rows
     panel_height = (
         legend_height + 22 * len(below) + 18 * len(doubts) + 16 * max(len(owners) - 1, 0) + 14
@@ -76,19 +72,17 @@ def with_panel(picture: Image.Image, dataset: Dataset, grid: Grid, scale: float)
     _north_arrow(draw, grid, left + picture.width - 42, 46)
     _legend(draw, entries, 16, top + 14, step, rows)
     if beside:
-        for index, (text, font) in enumerate(figures):
-            place = (width - 16, top + 14 + 22 * index)
-            draw.text(place, text, font=font, fill=INK[:3], anchor="rm")
+        for index, (text, size) in enumerate(figures):
+            place = (width - 16 - length_px(text, size), top + 14 + 22 * index + _DOWN_PX)
+            write(draw, place, text, size, INK[:3])
     top += legend_height - 12
-    for text, font in below:
-        draw.text((16, top), text, font=font, fill=INK[:3], anchor="lm")
+    for text, size in below:
+        write(draw, (16, top + _DOWN_PX), text, size, INK[:3])
         top += 22
     for number, line in enumerate(doubts):
-        place = (16, top + 12 + 18 * number)
-        draw.text(place, line, font=doubt_font, fill=theme.rgb(theme.DOUBT), anchor="ls")
+        write(draw, (16, top + 12 + 18 * number), line, 14, theme.rgb(theme.DOUBT))
     for number, line in enumerate(reversed(owners)):
-        place = (16, image.height - 12 - 16 * number)
-        draw.text(place, line, font=credit_font, fill=(190, 195, 200), anchor="ls")
+        write(draw, (16, image.height - 12 - 16 * number), line, 12, (190, 195, 200))
     return image
 
 
@@ -137,17 +131,17 @@ def _legend_entries(dataset: Dataset) -> list[tuple[str, str, Dash | None]]:
     return [(color, text, dash) for shown, color, text, dash in entries if shown]
 
 
-def _wrapped(text: str, font: _Font, width: int) -> list[str]:
+def _wrapped(text: str, size_px: int, width: int) -> list[str]:
     """A text in lines that fit a picture's width, pixels; the further ones are indented."""
     lines: list[str] = []
     line = ""
     for word in re.findall(r"\S+\s*", text):
-        if line.strip() and font.getlength((line + word).rstrip()) > width - 32:
+        if line.strip() and length_px((line + word).rstrip(), size_px) > width - 32:
             lines.append(line.rstrip())
             line = "    "
         for letter in word:
             # A word that is longer than a line, or a script without spaces.
-            if font.getlength((line + letter).rstrip()) > width - 32:
+            if length_px((line + letter).rstrip(), size_px) > width - 32:
                 lines.append(line)
                 line = "    "
             line += letter
