@@ -92,11 +92,3 @@ def test_of_a_recorded_round_the_next_step_is_told(tmp_path: Path) -> None:
     assert step in " ".join(told.split())
     assert run_geofield(*step.split()[1:], folder=tmp_path).returncode == 0
     assert tracks(tmp_path, "field.gpkg")[0] == 0
-
-
-def test_of_a_dxf_it_is_told_how_to_convert_it(tmp_path: Path) -> None:
-    pyogrio.write_dataframe(FIELD[["geometry"]], tmp_path / "a.dxf", driver="DXF")
-    done = run_geofield("import", "a.dxf", "-o", "plan.gpkg", folder=tmp_path)
-    assert done.returncode == 1
-    assert "ogr2ogr NAME.gpkg FILE" in done.stderr
-    assert "-a_srs EPSG:CODE" in done.stderr

@@ -219,7 +219,7 @@ def test_missing_and_unknown_files(tmp_path):
     with pytest.raises(FormatError, match="is not known") as told:
         read_dataset(tmp_path / "x.abc")
     # What is only written is no way out.
-    assert ".dxf" not in str(told.value)
+    assert ".html" not in str(told.value)
     assert "ogr2ogr NAME.gpkg FILE" in str(told.value)
     (tmp_path / "x.tif").write_bytes(b"II*\0")
     with pytest.raises(FormatError, match=r"x.tif is a picture") as told:

@@ -680,8 +680,8 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>FILE is a Shapefile, GeoPackage, GeoJSON, KML, GPX, GeoParquet, FlatGeobuf, ISOXML TASKDATA, AgOpenGPS field, a CSV table with lat and lon (or WKT), or what else GDAL finds shapes in (GML, MapInfo, a file geodatabase), in any CRS. Several files make one field: the boundary from one, the obstacles from another. A lone polygon, or GPX line that ends where it began, is the field; of several, whole words of the layers' names (boundary, trees), their columns, and what lies in what decide. What was taken as what is said on stderr.</source>
-      <translation>Eine Datei ist ein Shapefile, GeoPackage, GeoJSON, KML, GPX, GeoParquet, FlatGeobuf, ISOXML TASKDATA, ein Feld von AgOpenGPS, eine CSV-Tabelle mit lat und lon (oder WKT) oder was GDAL sonst an Dateien mit Formen liest (GML, MapInfo, eine File-Geodatabase), in einem beliebigen KBS. Mehrere Dateien ergeben ein Feld: die Grenze aus der einen, die Hindernisse aus der anderen. Ein einzelnes Polygon, oder eine Linie einer GPX-Datei, die endet, wo sie begann, ist das Feld; bei mehreren entscheiden ganze Wörter in den Namen der Layer (boundary, trees), ihre Spalten und was worin liegt. Was wofür genommen wurde, steht im Protokoll.</translation>
+      <source>FILE is a Shapefile, GeoPackage, GeoJSON, KML, GPX, GeoParquet, FlatGeobuf, DXF, ISOXML TASKDATA, AgOpenGPS field, a CSV table with lat and lon (or WKT), or what else GDAL finds shapes in (GML, MapInfo, a file geodatabase), in any CRS. Several files make one field: the boundary from one, the obstacles from another. A lone polygon, or line of GPX or DXF that ends where it began, is the field; of several, whole words of the layers' names (boundary, trees), their columns, and what lies in what decide. What was taken as what is said on stderr.</source>
+      <translation>Eine Datei ist ein Shapefile, GeoPackage, GeoJSON, KML, GPX, GeoParquet, FlatGeobuf, DXF, ISOXML TASKDATA, ein Feld von AgOpenGPS, eine CSV-Tabelle mit lat und lon (oder WKT) oder was GDAL sonst an Dateien mit Formen liest (GML, MapInfo, eine File-Geodatabase), in einem beliebigen KBS. Mehrere Dateien ergeben ein Feld: die Grenze aus der einen, die Hindernisse aus der anderen. Ein einzelnes Polygon, oder eine Linie von GPX oder DXF, die endet, wo sie begann, ist das Feld; bei mehreren entscheiden ganze Wörter in den Namen der Layer (boundary, trees), ihre Spalten und was worin liegt. Was wofür genommen wurde, steht im Protokoll.</translation>
     </message>
     <message>
       <location filename="description.json" />
@@ -1800,7 +1800,7 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>FILE is a Shapefile, GeoPackage, GeoJSON, KML, GPX, GeoParquet, FlatGeobuf, ISOXML TASKDATA, AgOpenGPS field, a CSV table with lat and lon (or WKT), or what else GDAL finds shapes in (GML, MapInfo, a file geodatabase), in any CRS.</source>
+      <source>FILE is a Shapefile, GeoPackage, GeoJSON, KML, GPX, GeoParquet, FlatGeobuf, DXF, ISOXML TASKDATA, AgOpenGPS field, a CSV table with lat and lon (or WKT), or what else GDAL finds shapes in (GML, MapInfo, a file geodatabase), in any CRS.</source>
       <translation type="unfinished" />
     </message>
     <message>

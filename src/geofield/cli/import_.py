@@ -44,12 +44,12 @@ def import_(
 ) -> None:
     """Read boundaries, obstacles and guidance lines from other programs' files.
 
-    FILE is a Shapefile, GeoPackage, GeoJSON, KML, GPX, GeoParquet, FlatGeobuf, ISOXML TASKDATA,
-    AgOpenGPS field, a CSV table with lat and lon (or WKT), or what else GDAL finds shapes in (GML,
-    MapInfo, a file geodatabase), in any CRS. Several files make one field: the boundary from one,
-    the obstacles from another. A lone polygon, or GPX line that ends where it began, is the field;
-    of several, whole words of the layers' names (boundary, trees), their columns, and what lies in
-    what decide. What was taken as what is said on stderr.
+    FILE is a Shapefile, GeoPackage, GeoJSON, KML, GPX, GeoParquet, FlatGeobuf, DXF, ISOXML
+    TASKDATA, AgOpenGPS field, a CSV table with lat and lon (or WKT), or what else GDAL finds shapes
+    in (GML, MapInfo, a file geodatabase), in any CRS. Several files make one field: the boundary
+    from one, the obstacles from another. A lone polygon, or line of GPX or DXF that ends where it
+    began, is the field; of several, whole words of the layers' names (boundary, trees), their
+    columns, and what lies in what decide. What was taken as what is said on stderr.
     """
     from geofield.formats import write_dataset
     from geofield.formats.importing import read_together, recorded

@@ -208,7 +208,10 @@ CATALOGUE: tuple[Format, ...] = (
         ("{stem}.dxf", "{stem}.prj"),
         ("field", "obstacles", "segments", "gaps"),
         "geofield.formats.dxf:write",
+        "geofield.formats.dxf:read",
         suffixes=(".dxf",),
+        asks_crs=True,
+        precision_m=1e-6,
         drops=(
             _PASSED,
             Drop("names, numbers and statuses", "field"),

@@ -181,7 +181,7 @@ class Format:
                 f"{self.title} can be written, not read.",
                 hint="`geofield formats` lists what can be read. Of what else GDAL reads, "
                 "`ogr2ogr NAME.gpkg FILE` makes a GeoPackage (-a_srs EPSG:CODE where it does not "
-                "say its CRS, as DXF never does).",
+                "say its CRS).",
             )
         return resolve_name(self.reader)  # type: ignore[no-any-return]
 
