@@ -10,6 +10,7 @@ import geopandas as gpd
 import numpy as np
 import pytest
 import shapely
+import shapely.affinity
 from formats_plan import make_dataset
 
 from geofield.formats import FORMATS, read_dataset, write_dataset
@@ -129,6 +130,33 @@ def test_a_fence_is_no_guidance(tmp_path):
     assert now["obstacle_no"].tolist()[:-1] == before["obstacle_no"].tolist()
     assert now.area.iloc[-1] == pytest.approx(line.length, rel=0.01)
     assert len(plan.table("tracks")) == len(dataset.table("tracks"))
+
+
+@pytest.mark.parametrize(
+    ("name", "column"), [("k.kml", "Name"), ("g.gpx", "name"), ("o.geojson", "barrier")]
+)
+def test_a_fence_among_guidance_is_no_guidance(tmp_path, name, column):
+    """Placemarks, recorded tracks and ways of maps lie in one layer and have names or kinds."""
+    lines = [*LINES, *(shapely.affinity.translate(line, 0, 30) for line in LINES)]
+    names = ["Fence east", "AB hedge side", "Heckenweg", "Zaun 2"]
+    there = gpd.GeoDataFrame({column: names}, geometry=lines, crs=32633).to_crs(4326)
+    there.to_file(tmp_path / name)
+    _, said, plan = imported(tmp_path, tmp_path / name)
+    assert "2 lines taken as obstacles, by name" in said
+    assert "2 lines taken as guidance" in said
+    assert plan.table("obstacles").area.to_numpy() == pytest.approx([20, 20], rel=0.01)
+    assert len(plan.table("tracks")) == 2
+
+
+def test_polygons_that_say_what_they_are_need_no_layer_of_their_own(tmp_path):
+    """A pond beside the field was a second field."""
+    beside = shapely.box(500_210, 5_500_020, 500_230, 5_500_040)
+    shapes = [BOX, beside, POND]
+    file = write(tmp_path / "map.shp", shapes, name=["Am Graben", "x", "y"], type=["", "pond", ""])
+    _, said, plan = imported(tmp_path, file)
+    assert "map: 1 polygon taken as the field" in said
+    assert plan.table("field").geometry.iloc[0].symmetric_difference(BOX).area < 0.1
+    assert len(plan.table("obstacles")) == 2
 
 
 def test_rows_without_a_shape_are_told(tmp_path):

@@ -1,15 +1,17 @@
 """What other programs' layers are: the field's outline, obstacles, guidance lines.
 
-Points are obstacles and lines guidance, but for fences and the like, by the layer's name. Of
-polygons, one that is alone is the field; among several, whole words of the layer's name and its
-columns say whether they are outlines or obstacles, and where they are silent, the largest is the
-field and what lies in it obstacles. Nothing is left out or taken without a word.
+Points are obstacles and lines guidance, but for fences and the like, by the layer's name or
+their own. Of polygons, one that is alone is the field; among several, whole words of the layer's
+name, their kinds and its columns say whether they are outlines or obstacles, and where they are
+silent, the largest is the field and what lies in it obstacles. Nothing is left out or taken
+without a word.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 import shapely
+from numpy.typing import NDArray
 from pyproj import CRS
 
 from geofield import schema
@@ -42,12 +45,19 @@ _OBSTACLE_WORDS = _words(
     """obstacle obstacles obstruction obstructions hindernis hindernisse tree trees baum baeume
     bäume arbre arbres exclusion exclusions hole holes interior inner flag flags pond ponds
     building buildings areafeature pointfeature fence fences zaun zäune hedge hedges hecke hecken
-    ditch ditches graben gräben wire wires"""
+    ditch ditches graben gräben wire wires wall walls mauer mauern"""
 )
 _FIELD_WORDS = _words(
     """field fields boundary boundaries outline outlines border perimeter parcel parcels parzelle
     parzellen schlag feld felder acker farm grenze grenzen exterior outer"""
 )
+_GUIDANCE_WORDS = _words(
+    """ab guidance track tracks curve curves swath swaths pass passes spur spuren fahrspur
+    fahrspuren leitlinie leitlinien"""
+)
+#: Columns that say what a shape is; lines are often told apart by their names alone.
+_KIND_COLUMNS = _words("kind type typ art class fclass category layer barrier waterway natural")
+_NAME_COLUMNS = _words("name label title")
 #: What is no guidance and no outline where the file has others: words by geometry.
 _ASIDE_WORDS = {
     "Polygon": _words("headland headlands vorgewende"),
@@ -79,15 +89,20 @@ class _Part:
     layer: str
     kind: str
     frame: Any
+    #: Whether each of its shapes says that it is an obstacle, whatever the layer is called.
+    stands: bool = False
 
     @property
     def aside(self) -> bool:
         """Whether its name says that it is neither outline nor guidance."""
-        return bool(_words(self.layer) & _ASIDE_WORDS.get(self.kind, frozenset()))
+        words = _ASIDE_WORDS.get(self.kind, frozenset())
+        return not self.stands and bool(_words(self.layer) & words)
 
     @property
     def role(self) -> str:
         """Of polygons, by name, else by columns; empty where neither says or both do."""
+        if self.stands:
+            return "obstacles"
         columns = {str(name).lower() for name in self.frame.columns}
         for obstacle, field in (
             (_words(self.layer) & _OBSTACLE_WORDS, _words(self.layer) & _FIELD_WORDS),
@@ -134,7 +149,7 @@ def sort_out(
         whole = _repaired(_joined(outlines), path, slivers=False)
         tables["field"] = field_table(whole, metric, path)
     lines = [part for part in parts if part.kind == "LineString"]
-    fences = [part for part in lines if _words(part.layer) & _OBSTACLE_WORDS]
+    fences = [part for part in lines if part.stands or _words(part.layer) & _OBSTACLE_WORDS]
     notes += [part.told(len(part.frame), "taken as obstacles, by name") for part in fences]
     standing = [*(part.frame for part in (*points, *fences)), *within]
     if standing:
@@ -171,11 +186,28 @@ def _parts(layer: RawLayer) -> list[_Part]:
         frame = frame.explode(index_parts=False, ignore_index=True)
         frame = frame[~frame.geometry.is_empty]
     kinds = frame.geom_type.replace("LinearRing", "LineString")
+    stands = np.zeros(len(frame), bool)
+    for kind, columns, others in (
+        ("Polygon", _KIND_COLUMNS, _FIELD_WORDS),
+        ("LineString", _KIND_COLUMNS | _NAME_COLUMNS, _GUIDANCE_WORDS),
+    ):
+        stands |= (kinds == kind).to_numpy() & _say_obstacle(frame, columns, others)
     return [
-        _Part(layer.name, kind, frame[kinds == kind])
+        _Part(layer.name, kind, frame[these], each)
         for kind in ("Polygon", "LineString", "Point")
-        if (kinds == kind).any()
+        for each in (False, True)
+        if (these := (kinds == kind) & (stands == each)).any()
     ]
+
+
+def _say_obstacle(
+    frame: gpd.GeoDataFrame, columns: Collection[str], others: frozenset[str]
+) -> NDArray[np.bool_]:
+    """Whether each shape's own texts name an obstacle, and nothing else that it may be."""
+    named = frame[[name for name in frame.columns if str(name).lower() in columns]]
+    texts = (" ".join(map(str, row)) for row in named.itertuples(index=False))
+    words = [_words(text) for text in texts]
+    return np.array([bool(w & _OBSTACLE_WORDS) and not w & others for w in words], bool)
 
 
 def _without_asides(parts: list[_Part], tables: dict[str, Any], notes: list[str]) -> list[_Part]:
