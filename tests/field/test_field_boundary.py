@@ -35,6 +35,22 @@ def test_a_parcel_of_an_old_datum_is_told():
         field_from_boundary(india.to_frame("geometry"), lat=28.0, lon=77.0)
 
 
+def test_what_else_the_file_has_in_the_parcel_is_told():
+    """Tracks ran through a pond of the same file without a word."""
+    across = shapely.LineString([(9.999, 50.0), (10.001, 50.0003)])
+    inside = [shapely.Point(LON, LAT).buffer(1e-4), across, shapely.Point(10.0001, 49.9995)]
+    # The same parcel as of another year, its border as a line, and what lies elsewhere.
+    others = [B, A.buffer(1e-5), A.exterior, across.buffer(1e-5).difference(A), None]
+    crs = "EPSG:4326"
+    for shape in inside:
+        both = gpd.GeoDataFrame(geometry=[A, *others, shape], crs=crs).to_crs(32632)
+        with pytest.warns(FieldWarning, match="1 more shape lies in this parcel") as told:
+            field_from_boundary(both, lat=50.0005, lon=LON)
+        assert len(told) == 1
+    quiet = gpd.GeoDataFrame({"name": ["A", *"bcdef"]}, geometry=[A, *others], crs=crs)
+    assert field_from_boundary(quiet, lat=50.0005, lon=LON).name == "A"
+
+
 def test_a_parcel_by_name_or_number():
     assert field_from_boundary(parcels(), lat=LAT, lon=LON, name="B").name == "B"
     assert field_from_boundary(parcels(), lat=LAT, lon=LON, name="8").name == "B"

@@ -61,7 +61,7 @@ def field_from_boundary(
         When no parcel, or more than one of different outline, fits.
     """
     shaped = parcels[~(parcels.geometry.isna() | parcels.geometry.is_empty)]
-    rows = shaped.reset_index(drop=True).explode()
+    rows = shapes = shaped.reset_index(drop=True).explode()
     points = int((rows.geometry.geom_type == "Point").sum())
     rows = _outlines(rows)
     if rows.empty:
@@ -93,12 +93,38 @@ def field_from_boundary(
         chosen = _around(rows, own, lat, lon)
     else:
         chosen = _only(rows)
+    _tell_inside(shapes, chosen)
     if lat is not None and lon is not None:
         _tell_parts(rows, chosen)
         return _field(chosen, own, lat, lon, pointed=True)
     inside = chosen.geometry.iloc[0].representative_point()
     lon, lat = transformer(own, LONLAT).transform(inside.x, inside.y)
     return _field(chosen, own, lat, lon, pointed=False)
+
+
+def _tell_inside(shapes: gpd.GeoDataFrame, chosen: gpd.GeoDataFrame) -> None:
+    """Tell what else the file has in the parcel: ponds, fences, wells."""
+    parcel = chosen.geometry.iloc[0]
+    near = shapes[shapes.geometry.intersects(shapely.envelope(parcel))]
+    # Its border may lie there as a line again, the same parcel as of another year.
+    inner = parcel.buffer(-0.01 * np.sqrt(parcel.area))
+    other = near.geometry.to_numpy()
+    lines = shapely.get_dimensions(other) == 1
+    middles = np.where(
+        lines,
+        shapely.line_interpolate_point(np.where(lines, other, None), 0.5, normalized=True),
+        shapely.point_on_surface(other),
+    )
+    there = shapely.within(middles, inner) & (shapely.area(other) < 0.5 * parcel.area)
+    if not there.any():
+        return
+    count = int(there.sum())
+    lie = "1 more shape lies" if count == 1 else f"{count} more shapes lie"
+    warn(
+        f"{lie} in this parcel of the boundary file without being driven around: `geofield import` "
+        "takes such as obstacles.",
+        FieldWarning,
+    )
 
 
 def _tell_parts(rows: gpd.GeoDataFrame, chosen: gpd.GeoDataFrame) -> None:
