@@ -62,6 +62,38 @@ def test_a_datum_that_is_metres_off_is_told_of_parcels_and_obstacles(tmp_path: P
     assert f"Note: trees.gpkg: {words}" in result.stderr
 
 
+def test_obstacles_of_a_file_come_to_those_of_a_plan(tmp_path: Path) -> None:
+    """A plan with obstacles was refused; in farms a fence through a tree was taken for the tree."""
+    outlines(1).to_file(tmp_path / "parcel.gpkg")
+    trees = gpd.points_from_xy([500050, 500120], [5600030, 5600050])
+    gpd.GeoDataFrame({"radius_m": [5.0, 5.0]}, geometry=trees, crs=CRS).to_file(
+        tmp_path / "trees.gpkg"
+    )
+    plan = tmp_path / "plan.gpkg"
+    run(tmp_path / "parcel.gpkg", "--obstacles", tmp_path / "trees.gpkg", "-o", plan)
+    table = pyogrio.read_dataframe(plan, layer="obstacles")
+    table.loc[1, "status"] = "possible"
+    pyogrio.write_dataframe(table, plan, layer="obstacles")
+    fence = shapely.LineString([(500030, 5600031), (500090, 5600031)])
+    known = gpd.GeoDataFrame(
+        {"name": ["fence", "pole", "the first tree"], "radius_m": [1.0, 0.5, 4.9]},
+        geometry=[fence, trees[1], trees[0]],
+        crs=CRS,
+    )
+    known.to_file(tmp_path / "known.gpkg")
+    again: list[str | Path] = [plan, "--obstacles", tmp_path / "known.gpkg", "-o", plan]
+    run(*again)
+    table = pyogrio.read_dataframe(plan, layer="obstacles")
+    assert table["status"].tolist() == ["added", "possible", "added", "added"]
+    assert table["obstacle_no"].tolist() == [1, 2, 3, 4]
+    segments = pyogrio.read_dataframe(plan, layer="segments")
+    assert not segments.intersects(fence).any()
+    assert not segments.intersects(trees[1].buffer(0.4)).any()
+    pyogrio.write_dataframe(table[table["obstacle_no"] != 3], plan, layer="obstacles")
+    run(*again)
+    assert pyogrio.read_dataframe(plan, layer="obstacles")["obstacle_no"].tolist() == [1, 2, 4]
+
+
 def test_a_heading_just_west_of_north_is_not_shown_as_180(tmp_path: Path) -> None:
     outlines(1).to_file(tmp_path / "parcel.gpkg")
     plan = tmp_path / "plan.gpkg"

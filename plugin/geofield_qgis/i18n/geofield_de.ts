@@ -1530,7 +1530,7 @@
     </message>
     <message>
       <location filename="description.json" />
-      <source>File of what to avoid: polygons, points with a radius_m, lines.</source>
+      <source>File of what to avoid, beside what a plan has: polygons, points with a radius_m, lines.</source>
       <translation type="unfinished" />
     </message>
     <message>
@@ -1936,6 +1936,11 @@
     <message>
       <location filename="description.json" />
       <source>Of a Dask cluster: tcp://HOST:8786.</source>
+      <translation type="unfinished" />
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>File of what to avoid: polygons, points with a radius_m, lines.</source>
       <translation type="unfinished" />
     </message>
     <message>

@@ -55,6 +55,7 @@ Examples (the first two on the project's own sample):
   geofield tracks sample_data/field_1.gpkg --direction 45 --headland 8 --route shortest \\
       --turning-radius 4 -o route.gpkg
   geofield tracks parcels.shp --obstacles trees.shp --clearance 1 --spacing 3 -o farm.gpkg
+  geofield tracks field.gpkg --obstacles poles.gpkg -o field.gpkg
   geofield tracks parcels.shp --spacing 3 --each -o plans/
 """,
 )
@@ -69,7 +70,7 @@ Examples (the first two on the project's own sample):
     "--obstacles",
     "obstacle_file",
     type=OLD_PATH,
-    help="File of what to avoid: polygons, points with a radius_m, lines.",
+    help="File of what to avoid, beside what a plan has: polygons, points with a radius_m, lines.",
 )
 @click.option("--crs", help="CRS of files that do not say theirs, e.g. EPSG:32633.")
 @name_option
@@ -214,7 +215,7 @@ def _one(
     fresh: bool,
 ) -> dict[str, Any]:
     """Plan one field and write it; its figures."""
-    from geofield.farm.standing import with_obstacles
+    from geofield.farm.standing import with_further
     from geofield.farm.work import plan_place
     from geofield.model.track_edits import TrackEdits
     from geofield.pipeline import run_tracks
@@ -228,7 +229,7 @@ def _one(
             inputs.append(file)
         else:
             if job.standing is not None:
-                plan = with_obstacles(plan, job.standing)
+                plan = with_further(plan, job.standing)
             if fresh:
                 evidence = replace(plan.evidence, track_edits=TrackEdits())
                 plan = replace(plan, tracks=None, evidence=evidence)

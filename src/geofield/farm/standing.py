@@ -33,14 +33,13 @@ from geofield.formats.foreign_tables import (
 from geofield.formats.gpkg_read import is_own
 from geofield.formats.raw_tables import CSV
 from geofield.formats.table_positions import read_table
-from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M
+from geofield.model.field import Field
+from geofield.model.obstacles import LINE_HALF_WIDTH_M, POINT_RADIUS_M, idle
 from geofield.model.review import reconcile
 from geofield.model.written import (
     free_number,
     listed,
-    matches,
     plain,
-    same_shapes,
     shapes_of_plain,
     unlisted,
 )
@@ -52,8 +51,10 @@ from geofield.wording import NAME_CRS, SWAP
 Shapes = Sequence[shapely.Geometry] | np.ndarray
 #: What a plan was given of such a file, in its evidence.
 _GIVEN = "given"
-#: Shapes of a file that differ by less are the same, metres.
-_SAME_M = 0.05
+#: Shapes that share so much of the ground of both are one object, moved or measured again.
+_SAME_SHARE = 0.25
+#: What is left of a shape by the rounding of others.
+_ROUNDED_SHARE = 0.01
 #: Points are wider than they look; the least that is looked at around a field.
 _NEAR_M = 100.0
 #: Rows of a file that have no shape, by their numbers from 1.
@@ -158,30 +159,19 @@ def _holds_obstacles(path: Path) -> bool:
     return is_geopackage(path) and layer in layer_names(path) and has_rows(path, layer)
 
 
-def with_obstacles(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:
-    """A plan with those obstacles of a file that stand in or at its field.
-
-    Raises
-    ------
-    TrackError
-        When the plan has obstacles already.
-    """
-    if plan.obstacles is not None and len(plan.obstacles):
+def _at_field(field: Field, standing: gpd.GeoDataFrame) -> gpd.GeoDataFrame:
+    """Those obstacles of a file that stand in or at a field, as its layer."""
+    around = _around(field, standing)
+    mine = standing.iloc[around].to_crs(field.crs)
+    near = mine.geometry.intersects(field.polygon.buffer(standing.attrs[_NEAR]))
+    if not near.any() and _swapped_here(standing, field):
         raise TrackError(
-            f"{plan.field.name} has obstacles of its own.",
-            hint="Edit those in the plan, or give its outline alone.",
-        )
-    around = _around(plan, standing)
-    mine = standing.iloc[around].to_crs(plan.field.crs)
-    near = mine.geometry.intersects(plan.field.polygon.buffer(standing.attrs[_NEAR]))
-    if not near.any() and _swapped_here(standing, plan):
-        raise TrackError(
-            f"The obstacles lie at {plan.field.name} only with latitude and longitude swapped.",
+            f"The obstacles lie at {field.name} only with latitude and longitude swapped.",
             hint=f"Exchange them in the file of obstacles: {SWAP}",
         )
-    table = obstacle_table(mine[near].reset_index(drop=True), plan.field.crs, Path("obstacles"))
-    reach = table.geometry.intersects(plan.field.polygon)
-    return replace(plan, obstacles=table[reach].reset_index(drop=True))
+    table = obstacle_table(mine[near].reset_index(drop=True), field.crs, Path("obstacles"))
+    reach = table.geometry.intersects(field.polygon)
+    return table[reach].reset_index(drop=True)
 
 
 def any_reached(standing: gpd.GeoDataFrame, outlines_lonlat: Iterable[Shapes]) -> bool:
@@ -232,9 +222,13 @@ def with_further(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:
     """A plan with those obstacles of a file that it was not given before.
 
     What a person took away, moved or rejected of them stays so: an obstacle is taken in once.
+
+    Raises
+    ------
+    TrackError
+        When they would stand there with latitude and longitude swapped.
     """
-    table = with_obstacles(Plan(plan.field), standing).obstacles
-    return plan if table is None else _given(plan, table)
+    return _given(plan, _at_field(plan.field, standing))
 
 
 def with_given(plan: Plan, before: Plan) -> Plan:
@@ -255,8 +249,12 @@ def _given(plan: Plan, table: gpd.GeoDataFrame) -> Plan:
     if plan.obstacles is None:
         return replace(plan, obstacles=table, evidence=evidence)
     before, written = reconcile(plan.obstacles, plan.evidence.written, plan.grid)
-    shapes = shapes_of_plain([*map(unlisted, known), *written.removed])
-    new = ~_is_one_of(table.geometry, np.concatenate([before.geometry.to_numpy(), shapes]))
+    rejected = before.geometry[before["status"] == "rejected"].to_numpy()
+    taken = shapes_of_plain([*map(unlisted, known), *written.removed])
+    # What is driven around already is not there twice; what was only possible may be.
+    avoided = before.geometry[~idle(before)].to_numpy()
+    new = ~_is_one_of(table.geometry, np.concatenate([rejected, taken]))
+    new &= ~_is_covered(table.geometry, avoided)
     if not new.any():
         return plan
     return with_rows(replace(plan, evidence=evidence), table[new])
@@ -275,18 +273,35 @@ def with_rows(plan: Plan, rows: gpd.GeoDataFrame) -> Plan:
 
 
 def _is_one_of(shapes: Any, others: Any) -> np.ndarray:
-    """Whether each is the same object as some other; a bent fence holds its own middle nowhere."""
-    mine = np.asarray(shapes, dtype=object)
-    known = matches(mine, others) >= 0
-    row, other = shapely.STRtree(others).query(mine, predicate="intersects")
-    known[row[same_shapes(mine[row], others[other], _SAME_M)]] = True
-    return known
+    """Whether each is the same object as some other: of the ground of both they share a part."""
+    mine, theirs = _sound(shapes), _sound(others)
+    row, other = shapely.STRtree(theirs).query(mine, predicate="intersects")
+    shared = shapely.area(shapely.intersection(mine[row], theirs[other]))
+    either = shapely.area(mine[row]) + shapely.area(theirs[other]) - shared
+    return np.isin(np.arange(len(mine)), row[shared >= _SAME_SHARE * either])
 
 
-def _around(plan: Plan, standing: gpd.GeoDataFrame) -> np.ndarray:
+def _is_covered(shapes: Any, others: Any) -> np.ndarray:
+    """Whether each lies in others but for rounding: a fence through a tree does not."""
+    mine, theirs = _sound(shapes), _sound(others)
+    row, other = shapely.STRtree(theirs).query(mine, predicate="intersects")
+    result = np.zeros(len(mine), bool)
+    for at in np.unique(row):
+        left = mine[at].difference(shapely.union_all(theirs[other[row == at]]))
+        result[at] = left.area <= _ROUNDED_SHARE * mine[at].area
+    return result
+
+
+def _sound(shapes: Any) -> np.ndarray:
+    """Shapes of which areas can be asked."""
+    array = np.asarray(shapes, dtype=object)
+    return np.where(shapely.is_valid(array), array, shapely.make_valid(array))
+
+
+def _around(field: Field, standing: gpd.GeoDataFrame) -> np.ndarray:
     """Rows of the file around a field, by its index, in the file's order."""
-    near = plan.field.polygon.buffer(2.0 * standing.attrs[_NEAR])
-    around = gpd.GeoSeries([near], crs=plan.field.crs)
+    near = field.polygon.buffer(2.0 * standing.attrs[_NEAR])
+    around = gpd.GeoSeries([near], crs=field.crs)
     there = np.asarray(around.to_crs(standing.crs))
     turns: tuple[float, ...] = (0.0,)
     if standing.crs.is_geographic:
@@ -296,12 +311,12 @@ def _around(plan: Plan, standing: gpd.GeoDataFrame) -> np.ndarray:
     return np.unique(standing.sindex.query(boxes)[1])
 
 
-def _swapped_here(standing: gpd.GeoDataFrame, plan: Plan) -> bool:
+def _swapped_here(standing: gpd.GeoDataFrame, field: Field) -> bool:
     """Whether obstacles would stand in the field with their latitude and longitude exchanged."""
-    west, south, east, north = plan.field.polygon_lonlat.bounds
+    west, south, east, north = field.polygon_lonlat.bounds
     exchanged = shapely.box(south, west, north, east)
     if not standing.crs.is_geographic:
         return False
     there = standing.iloc[standing.sindex.query(exchanged)]
     swapped = shapely.transform(there.geometry.to_numpy(), lambda xy: xy[:, ::-1])
-    return bool(shapely.intersects(swapped, plan.field.polygon_lonlat).any())
+    return bool(shapely.intersects(swapped, field.polygon_lonlat).any())
