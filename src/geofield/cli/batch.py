@@ -125,10 +125,10 @@ def batch(
     Ctrl+C lets the fields at work end; a second one stops at once. The same command goes on.
     """
     from geofield.farm.finish import finish
+    from geofield.farm.folder import outlines_in
     from geofield.farm.limits import Limits
     from geofield.farm.reviewed import reviewed_rows, without_place
     from geofield.farm.run import run_farm
-    from geofield.farm.standing import outlines_in
     from geofield.farm.store import Store
     from geofield.farm.work import Job
 

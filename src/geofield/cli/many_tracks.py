@@ -105,9 +105,9 @@ def _farm(places: Places, job: Job, folder: Path, wanted: Wanted, *, fresh: bool
     from geofield.cli.batch import overview_renewed, take_in
     from geofield.farm.engine import Here
     from geofield.farm.finish import finish
+    from geofield.farm.folder import outlines_in
     from geofield.farm.pool import Pool, cores
     from geofield.farm.run import run_farm
-    from geofield.farm.standing import outlines_in
     from geofield.farm.store import Store
     from geofield.farm.value import read_farm
 

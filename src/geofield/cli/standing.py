@@ -11,8 +11,8 @@ from geofield.wording import counted, none_of, without_shape
 
 if TYPE_CHECKING:
     from geofield.farm.places import Places
-    from geofield.farm.standing import Shapes
     from geofield.farm.work import Job
+    from geofield.known import Shapes
 
 
 def obstacles_for(
@@ -22,7 +22,7 @@ def obstacles_for(
 
     Those of a plan, or of several in one GeoPackage, unless a picture shows what stands there.
     """
-    from geofield.farm.standing import own_obstacles
+    from geofield.known import own_obstacles
 
     if places is None or given is not None or imagery is not None:
         return given
@@ -41,7 +41,7 @@ def tell_obstacles(job: Job, *, several: bool) -> None:
     from pyproj import CRS
 
     from geofield.datum import datum_notes
-    from geofield.farm.standing import LAYERS, WITHOUT_SHAPE, unsized_points
+    from geofield.known import LAYERS, WITHOUT_SHAPE, unsized_points
     from geofield.model.obstacles import POINT_RADIUS_M
 
     standing = job.standing
@@ -65,7 +65,7 @@ def tell_obstacles(job: Job, *, several: bool) -> None:
 
 def tell_unreached(job: Job, outlines_lonlat: Iterable[Shapes]) -> None:
     """Tell when nothing of the file of obstacles stands at any field that was planned."""
-    from geofield.farm.standing import any_reached
+    from geofield.known import any_reached
 
     standing = job.standing
     if job.obstacles is None or standing is None:

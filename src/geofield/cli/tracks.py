@@ -215,8 +215,8 @@ def _one(
     fresh: bool,
 ) -> dict[str, Any]:
     """Plan one field and write it; its figures."""
-    from geofield.farm.standing import with_further
     from geofield.farm.work import plan_place
+    from geofield.known import with_further
     from geofield.model.track_edits import TrackEdits
     from geofield.pipeline import run_tracks
     from geofield.plan import Plan

@@ -18,7 +18,7 @@ from geofield.errors import FormatError, GeofieldError
 from geofield.farm import edited_tracks
 from geofield.farm.as_written import own_names, text_of
 from geofield.farm.layers import EPSG, FIELD_ID
-from geofield.farm.standing import with_further
+from geofield.known import with_further
 from geofield.model import Field
 from geofield.model.review import reconcile
 from geofield.notes import listening, warn

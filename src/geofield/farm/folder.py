@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import shapely
+from numpy.typing import NDArray
 
 from geofield import __version__, schema
 from geofield.crs import LONLAT
@@ -186,3 +187,9 @@ def read_parts(
         table = read_part(store, layer, chunk, columns)
         if table is not None:
             yield chunk, table
+
+
+def outlines_in(store: Store) -> Iterator[NDArray[np.object_]]:
+    """The outlines of a farm in degrees, chunk by chunk."""
+    for _, table in read_parts(store, schema.FIELD.name, [GEOMETRY]):
+        yield shapely.from_wkb(table[GEOMETRY].to_numpy(zero_copy_only=False))

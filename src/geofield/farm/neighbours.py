@@ -11,8 +11,8 @@ import shapely
 from geofield import schema
 from geofield.crs import metre_in, reproject
 from geofield.farm.layers import EPSG, FIELD_ID
-from geofield.farm.standing import with_rows
 from geofield.farm.value import Farm
+from geofield.known import with_rows
 from geofield.model.obstacles import active
 from geofield.plan import Plan
 

@@ -20,7 +20,6 @@ from geofield.farm.folder import file_of as file_in
 from geofield.farm.layers import FIELD_ID, KEPT, stacked, tables_of
 from geofield.farm.marks import CHANGED
 from geofield.farm.reviewed import SUFFIX, file_of, reviewed_files
-from geofield.farm.standing import with_given
 from geofield.farm.status import Outcome, outcome_words, outcomes_of, status_table
 from geofield.farm.store import Store
 from geofield.farm.taken_out import (
@@ -34,6 +33,7 @@ from geofield.farm.taken_out import (
 from geofield.farm.value import read_farm
 from geofield.farm.work import is_near, overlap
 from geofield.formats.gpkg_guests import bring_guests
+from geofield.known import with_given
 from geofield.model.written import same_shapes
 from geofield.notes import warn
 from geofield.pipeline import run_tracks

@@ -18,9 +18,9 @@ from geofield.errors import (
 )
 from geofield.farm.place_reader import read_places
 from geofield.farm.places import Place, Places
-from geofield.farm.standing import own_obstacles
 from geofield.farm.work import Job, in_words, plan_place, told
 from geofield.imagery import Imagery
+from geofield.known import own_obstacles
 from geofield.notes import listening, warn
 from geofield.plan import Plan
 from geofield.settings import Settings, with_values

@@ -22,8 +22,8 @@ from geofield.errors import (
 )
 from geofield.farm.place_settings import as_settings
 from geofield.farm.places import Place
-from geofield.farm.standing import obstacles_of, with_further
 from geofield.imagery import Imagery
+from geofield.known import obstacles_of, with_further
 from geofield.model.evidence import Evidence, outline_record
 from geofield.model.field import Field
 from geofield.model.scene import ImagerySource

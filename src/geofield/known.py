@@ -1,8 +1,8 @@
-"""Obstacles of a file of their own: what stands in or at each field."""
+"""What a person knows to stand in or at fields, from a file or a table of their own."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -16,9 +16,6 @@ import shapely
 from geofield import schema
 from geofield.crs import DEGREE_M, LONLAT, parse_crs
 from geofield.errors import CRSError, FormatError, TrackError
-from geofield.farm.folder import read_parts
-from geofield.farm.layers import GEOMETRY
-from geofield.farm.store import Store
 from geofield.finite import refuse_nowhere
 from geofield.formats.antimeridian import unwrapped
 from geofield.formats.foreign import has_rows, layer_names, read_vector
@@ -94,15 +91,32 @@ def _read(path: Path, crs: str | None, _stamp: tuple[tuple[int, int], ...]) -> g
         if crs is None:
             raise CRSError(f"{path} does not say its CRS.", hint=NAME_CRS)
         frame = frame.set_crs(parse_crs(crs))
-    if column_like(frame, NUMBER_COLUMNS) is None:
-        frame = frame.assign(obstacle_no=np.arange(1, len(frame) + 1))
-    empty = np.asarray(frame.geometry.isna() | frame.geometry.is_empty)
-    refuse_nowhere(frame.geometry.to_numpy(), path.name)
-    rows = frame[~empty].explode()
-    _understand_lengths(rows, path)
-    rows = rows.reset_index(drop=True)
-    rows.attrs[WITHOUT_SHAPE] = [int(row) + 1 for row in frame.index[empty]]
+    rows = known_rows(frame, path.name)
     rows.attrs[LAYERS] = layers
+    return rows
+
+
+def known_rows(table: gpd.GeoDataFrame, name: str) -> gpd.GeoDataFrame:
+    """The rows of a table of what to avoid, part by part, numbered; those without a shape left out.
+
+    Raises
+    ------
+    CRSError
+        When the table has no CRS.
+    FormatError
+        For a point whose radius or margin is there and cannot be understood.
+    """
+    if table.crs is None:
+        raise CRSError(f"{name} does not say its CRS.", hint="Set it: table.set_crs(...).")
+    if column_like(table, NUMBER_COLUMNS) is None:
+        table = table.assign(obstacle_no=np.arange(1, len(table) + 1))
+    table = table.reset_index(drop=True)
+    empty = np.asarray(table.geometry.isna() | table.geometry.is_empty)
+    refuse_nowhere(table.geometry.to_numpy(), name)
+    rows = table[~empty].explode()
+    _understand_lengths(rows, name)
+    rows = rows.reset_index(drop=True)
+    rows.attrs[WITHOUT_SHAPE] = [int(row) + 1 for row in table.index[empty]]
     rows.attrs[_NEAR] = max(_NEAR_M, 1.1 * float(_reach_m(rows).max(initial=0.0)))
     return rows
 
@@ -128,7 +142,7 @@ def _rows_and_layers(path: Path) -> tuple[gpd.GeoDataFrame, list[str]]:
     return pd.concat(alike, ignore_index=True), list(tables) if len(tables) > 1 else []
 
 
-def _understand_lengths(rows: gpd.GeoDataFrame, path: Path) -> None:
+def _understand_lengths(rows: gpd.GeoDataFrame, name: str) -> None:
     """Make radius and margin of points and lines numbers; refuse what would become smaller."""
     for names in (RADIUS_COLUMNS, BUFFER_COLUMNS):
         said = column_like(rows, names)
@@ -141,7 +155,7 @@ def _understand_lengths(rows: gpd.GeoDataFrame, path: Path) -> None:
         if wrong.any():
             row, text = rows.index[wrong][0] + 1, str(said[wrong].iloc[0])
             raise FormatError(
-                f"{path.name}, row {row}: {said.name} {text!r} is no length.",
+                f"{name}, row {row}: {said.name} {text!r} is no length.",
                 hint="Write metres as a number, such as 6.5, or leave it empty.",
             )
         rows[said.name] = lengths_m
@@ -212,14 +226,8 @@ def unsized_points(standing: gpd.GeoDataFrame) -> int:
     return int(np.count_nonzero((standing.geom_type == "Point") & ~sized))
 
 
-def outlines_in(store: Store) -> Iterator[np.ndarray]:
-    """The outlines of a farm in degrees, chunk by chunk."""
-    for _, table in read_parts(store, schema.FIELD.name, [GEOMETRY]):
-        yield shapely.from_wkb(table[GEOMETRY].to_numpy(zero_copy_only=False))
-
-
 def with_further(plan: Plan, standing: gpd.GeoDataFrame) -> Plan:
-    """A plan with those obstacles of a file that it was not given before.
+    """A plan with those obstacles of `known_rows` that it was not given before.
 
     What a person took away, moved or rejected of them stays so: an obstacle is taken in once.
 
