@@ -22,6 +22,7 @@ from geofield.pipeline import plan_field, run_field, run_obstacles, run_tracks
 from geofield.plan import Plan, read_plan
 from geofield.settings import Settings, load_settings
 from geofield.simulate import SimulatedField
+from geofield_command import run_geofield as geofield
 
 SETTINGS = load_settings(None, {"tracks": {"spacing_m": 6.0}, "obstacles": {"buffer_m": 1.5}})
 
@@ -75,6 +76,38 @@ def test_the_plan_fits_the_truth(plan: Plan, simulated: SimulatedField) -> None:
     assert plan.tracks is not None
     free = plan.field.polygon.difference(plan.obstacles.union_all().buffer(-0.05))
     assert all(free.buffer(1e-6).covers(segment) for segment in plan.tracks.segments.geometry)
+
+
+def test_what_is_known_to_stand_there_is_driven_around(
+    plan: Plan, simulated: SimulatedField, simulated_tif: Path, tmp_path: Path
+) -> None:
+    field, tree = plan.field, plan.obstacles.iloc[0]  # type: ignore[union-attr]
+    middle = tree.geometry.centroid
+    fence = shapely.LineString([(middle.x - 30, middle.y), (middle.x + 30, middle.y + 2)])
+    table = gpd.GeoDataFrame(
+        {"radius_m": [float(tree.radius_m), np.nan]}, geometry=[middle, fence], crs=field.crs
+    )
+    place: dict[str, Any] = {"lat": simulated.lat, "lon": simulated.lon, "settings": SETTINGS}
+    there = plan_field(simulated.scene, **place, known=table.to_crs(4326))
+    assert there.obstacles is not None
+    assert there.tracks is not None
+    # The tree that is seen, too, is there once; nothing was there before that could have changed.
+    assert there.obstacles["status"].value_counts()["added"] == 2
+    assert len(there.obstacles) == len(plan.obstacles) + 1  # type: ignore[arg-type]
+    assert not there.changes
+    assert not there.tracks.segments.intersects(fence).any()
+    table.to_file(tmp_path / "known.gpkg")
+    for again in ((), ("--overwrite",)):
+        done = geofield(
+            "run", simulated_tif, "--lat", simulated.lat, "--lon", simulated.lon, "--spacing", 6,
+            "--obstacles", tmp_path / "known.gpkg", "--out", tmp_path / "out", *again,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        read = read_plan(tmp_path / "out" / "field.gpkg")
+        assert read.obstacles is not None
+        assert read.obstacles["status"].value_counts()["added"] == 2
+    with pytest.raises(gf.GeofieldError, match="does not say its CRS"):
+        plan_field(simulated.scene, **place, known=table.set_crs(None, allow_override=True))
 
 
 def test_stage_by_stage_is_the_same(plan: Plan, simulated: SimulatedField) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, MutableMapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -58,6 +58,9 @@ from geofield.windows import (
     wider,
 )
 
+if TYPE_CHECKING:
+    import geopandas as gpd
+
 #: Called with (done, total, what).
 Progress = Callable[[int, int, str], None]
 #: Gives the path of what shows a square of a side in ground metres; None where nothing does.
@@ -74,6 +77,7 @@ def plan_field(
     settings: Settings | None = None,
     previous: Plan | None = None,
     boundary: Field | None = None,
+    known: gpd.GeoDataFrame | None = None,
     progress: Progress | None = None,
     timings_s: MutableMapping[str, float] | None = None,
     name: str | None = None,
@@ -98,8 +102,9 @@ def plan_field(
         An earlier plan of the same field: its outline, where a person drew it, and its
         reviewed obstacles are kept, and what they set on the review page where nothing is said.
     boundary : Field, optional
-        The user's own outline; nothing is extracted then. One that a person drew in `previous`
-        stands above it.
+        The user's own outline, below one that a person drew in `previous`; none is extracted then.
+    known : GeoDataFrame, optional
+        What is known to stand there, in any CRS: polygons, points with a ``radius_m``, lines.
     progress : callable, optional
         Called with (done, total, what) at each stage.
     timings_s : mutable mapping, optional
@@ -107,8 +112,8 @@ def plan_field(
     name : str, optional
         Of the field; its earlier plan's, or its place, when not given.
     fetch_wider : callable, optional
-        Of a picture that was fetched for this place: called with a side, ground metres, where the
-        field goes on outside; returns the path of a picture so wide, or None.
+        Of a fetched picture beyond which the field goes on: called with a side, ground metres;
+        returns the path of a picture so wide, or None.
     **by_name
         Any setting by its own name, over those of `settings`: ``spacing_m=6``; ``machine`` may
         be one of the settings, a `Machine` or a mapping such as ``{"width_m": 12}``.
@@ -120,24 +125,21 @@ def plan_field(
     settings = with_values(settings, **by_name)
     tell, timings = progress or (lambda *_: None), {} if timings_s is None else timings_s
     with _timed("picture", timings, tell):
-        known = known_outline(boundary, previous, lat, lon)
+        outline = known_outline(boundary, previous, lat, lon)
         previous = of_the_same_field(previous, lat, lon)
-        picture = _seen(scene, lat, lon, with_points(settings, previous), known)
+        picture = _seen(scene, lat, lon, with_points(settings, previous), outline)
     with _timed("field", timings, tell):
         plan = run_field(
-            scene,
-            lat=lat,
-            lon=lon,
-            settings=settings,
-            previous=previous,
-            boundary=boundary,
-            window=picture,
-            name=name,
-            fetch_wider=fetch_wider,
-        )
-        picture = plan.scene or picture
+            scene, lat=lat, lon=lon, settings=settings, previous=previous, boundary=boundary,
+            window=picture, name=name, fetch_wider=fetch_wider,
+        )  # fmt: skip
     with _timed("obstacles", timings, tell):
-        plan = run_obstacles(plan, picture, settings=settings)
+        if known is not None:
+            from geofield.known import known_rows, with_further
+
+            plan = with_further(plan, known_rows(known, "known"))
+        plan = run_obstacles(plan, plan.scene or picture, settings=settings)
+        plan = replace(plan, changes=() if previous is None else plan.changes)
     with _timed("tracks", timings, tell):
         return run_tracks(plan, settings=plan.settings or settings)
 

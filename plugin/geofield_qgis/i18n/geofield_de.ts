@@ -1310,6 +1310,16 @@
     </message>
     <message>
       <location filename="description.py" />
+      <source>Obstacle file</source>
+      <translation>Hindernisse</translation>
+    </message>
+    <message>
+      <location filename="description.json" />
+      <source>File of what is known to stand there: polygons, points with a radius_m, lines.</source>
+      <translation>Datei mit bekannten Hindernissen: Flächen, Punkte mit radius_m, Linien.</translation>
+    </message>
+    <message>
+      <location filename="description.py" />
       <source>Fresh</source>
       <translation>Von vorn</translation>
     </message>
@@ -1521,16 +1531,6 @@
     <message>
       <location filename="description.json" />
       <source>A GeoPackage for each of several fields, in a folder.</source>
-      <translation type="unfinished" />
-    </message>
-    <message>
-      <location filename="description.py" />
-      <source>Obstacle file</source>
-      <translation>Hindernisse</translation>
-    </message>
-    <message>
-      <location filename="description.json" />
-      <source>File of what to avoid, beside what a plan has: polygons, points with a radius_m, lines.</source>
       <translation type="unfinished" />
     </message>
     <message>
@@ -1936,11 +1936,6 @@
     <message>
       <location filename="description.json" />
       <source>Of a Dask cluster: tcp://HOST:8786.</source>
-      <translation type="unfinished" />
-    </message>
-    <message>
-      <location filename="description.json" />
-      <source>File of what to avoid: polygons, points with a radius_m, lines.</source>
       <translation type="unfinished" />
     </message>
     <message>

@@ -13,11 +13,11 @@ import click
 
 from geofield.cli.console import echo_json, progress_bar, say, say_note
 from geofield.cli.field_notes import tell_farm
-from geofield.cli.files import FARM, OLD_FILE, PATH, claim_folder
+from geofield.cli.files import FARM, PATH, claim_folder
 from geofield.cli.grouped import GroupedCommand
 from geofield.cli.options import Number, acknowledge_option, stage_options, tell_idle
 from geofield.cli.parcels import place_options, places_of
-from geofield.cli.standing import obstacles_for, tell_obstacles, tell_unreached
+from geofield.cli.standing import obstacles_for, obstacles_option, tell_obstacles, tell_unreached
 from geofield.errors import FieldError, GeofieldError
 from geofield.wording import counted
 
@@ -59,12 +59,7 @@ Examples (the first one on the project's own sample):
     help="Worker processes on this machine; one per core by default.",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster: tcp://HOST:8786.")
-@click.option(
-    "--obstacles",
-    "obstacle_file",
-    type=OLD_FILE,
-    help="File of what to avoid: polygons, points with a radius_m, lines.",
-)
+@obstacles_option
 @click.option(
     "--fresh",
     is_flag=True,

@@ -20,6 +20,7 @@ from geofield.cli.options import (
 )
 from geofield.cli.parcels import boundary_options, parcel_and_point
 from geofield.cli.refresh import say_outdated
+from geofield.cli.standing import obstacles_option, tell_obstacles, tell_unreached
 from geofield.errors import OutputExistsError
 from geofield.wording import counted
 
@@ -32,12 +33,13 @@ if TYPE_CHECKING:
 @click.command(
     cls=GroupedCommand,
     epilog="""\b
-Examples (on the project's own sample):
+Examples (the first three on the project's own sample):
   geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --spacing 4 --out out/
   geofield run sample_data/field_1.tif --lat 35.075373 --lon 33.531142 --out out/ \\
       --buffer 2 --format gpkg --format geojson --overwrite
   geofield run sample_data/field_1.tif --out own/ \\
       --boundary sample_data/field_1.gpkg --boundary-layer field
+  geofield run ortho.tif --lat 35.075373 --lon 33.531142 --obstacles poles.gpkg --out out/
 """,
 )
 @click.argument("imagery", type=click.Path(path_type=str))
@@ -53,6 +55,7 @@ Examples (on the project's own sample):
     is_flag=True,
     help="Replace earlier products there; reviewed obstacles and a moved outline are kept.",
 )
+@obstacles_option
 @click.option("--fresh", is_flag=True, help="With --overwrite: forget what a person edited there.")
 @acknowledge_option
 @name_option
@@ -75,6 +78,7 @@ def run(
     lon: float | None,
     out: Path,
     overwrite: bool,
+    obstacle_file: Path | None,
     fresh: bool,
     acknowledge_terms: bool,
     name: str | None,
@@ -92,6 +96,7 @@ def run(
     """
     from geofield.cli.imagery_tools import imagery_of, say_wider
     from geofield.earlier import known_outline, no_longer_said, with_said_tracks
+    from geofield.farm.work import Job
     from geofield.formats import format_named
     from geofield.pipeline import plan_field
     from geofield.plan import read_plan
@@ -114,6 +119,8 @@ def run(
     gone = no_longer_said(settings, previous)
     if gone is not None:
         say_note(gone)
+    job = Job(settings, obstacles=obstacle_file)
+    tell_obstacles(job, several=False)
     timings: dict[str, float] = {}
     seen = showing(settings, lat, lon, known_outline(parcel, previous, lat, lon))
     source = imagery_of(imagery, seen, (lon, lat), acknowledged=acknowledge_terms)
@@ -123,10 +130,12 @@ def run(
     ):
         plan = plan_field(
             picture.path, lat=lat, lon=lon, settings=settings, previous=previous, boundary=parcel,
-            progress=progress, timings_s=timings, name=name, fetch_wider=picture.wider,
+            known=job.standing, progress=progress, timings_s=timings, name=name,
+            fetch_wider=picture.wider,
         )  # fmt: skip
-        inputs = [each for each in (imagery, boundary) if each is not None]
+        inputs = [each for each in (imagery, boundary, obstacle_file) if each is not None]
         files = plan.write(out, overwrite=overwrite, timings_s=timings, inputs=inputs)
+    tell_unreached(job, [[plan.field.polygon_lonlat]])
     if as_json:
         echo_json(json.loads((out / "report.json").read_text(encoding="utf-8")))
     else:

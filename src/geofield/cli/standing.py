@@ -6,13 +6,24 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import click
+
 from geofield.cli.console import say, say_note
+from geofield.cli.files import OLD_PATH
 from geofield.wording import counted, none_of, without_shape
 
 if TYPE_CHECKING:
     from geofield.farm.places import Places
     from geofield.farm.work import Job
     from geofield.known import Shapes
+
+
+obstacles_option = click.option(
+    "--obstacles",
+    "obstacle_file",
+    type=OLD_PATH,
+    help="File of what is known to stand there: polygons, points with a radius_m, lines.",
+)
 
 
 def obstacles_for(

@@ -36,7 +36,7 @@ from geofield.cli.options import (
     tell_idle,
 )
 from geofield.cli.refresh import say_outdated
-from geofield.cli.standing import obstacles_for, tell_obstacles, tell_unreached
+from geofield.cli.standing import obstacles_for, obstacles_option, tell_obstacles, tell_unreached
 from geofield.errors import FieldWarning, TrackError
 from geofield.wording import counted
 
@@ -66,12 +66,7 @@ Examples (the first two on the project's own sample):
     PATH,
 )
 @click.option("--each", is_flag=True, help="A GeoPackage for each of several fields, in a folder.")
-@click.option(
-    "--obstacles",
-    "obstacle_file",
-    type=OLD_PATH,
-    help="File of what to avoid, beside what a plan has: polygons, points with a radius_m, lines.",
-)
+@obstacles_option
 @click.option("--crs", help="CRS of files that do not say theirs, e.g. EPSG:32633.")
 @name_option
 @defaults_option
