@@ -57,7 +57,7 @@ def test_an_option_has_the_same_kind_of_value_in_every_command() -> None:
     assert not several
 
 
-_FIRST = {"the first one ": 1, "the first two ": 2}
+_FIRST = {"the first one ": 1, "the first two ": 2, "the first three ": 3}
 
 
 def examples_on_the_sample(name: str) -> list[str]:

@@ -105,7 +105,8 @@ def field_from_boundary(
 def _tell_inside(shapes: gpd.GeoDataFrame, chosen: gpd.GeoDataFrame) -> None:
     """Tell what else the file has in the parcel: ponds, fences, wells."""
     parcel = chosen.geometry.iloc[0]
-    near = shapes[shapes.geometry.intersects(shapely.envelope(parcel))]
+    near = shapes[finite(shapes.geometry.to_numpy())]
+    near = near[near.geometry.intersects(shapely.envelope(parcel))]
     # Its border may lie there as a line again, the same parcel as of another year.
     inner = parcel.buffer(-0.01 * np.sqrt(parcel.area))
     other = near.geometry.to_numpy()
