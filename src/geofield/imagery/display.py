@@ -193,7 +193,7 @@ def shown_pixels(scene: Scene, crs: CRS, long_side_px: int) -> tuple[NDArray[np.
 def _direct(grid: Grid, crs: CRS) -> bool:
     """Whether a grid is north-up with square pixels in a CRS."""
     t = grid.transform
-    return bool(t.b == 0 and t.d == 0 and t.a == -t.e and grid.crs == crs)
+    return bool(t.b == 0 and t.d == 0 and 0 < t.a == -t.e and grid.crs == crs)
 
 
 def _bounds(grid: Grid, crs: CRS) -> Bounds:
