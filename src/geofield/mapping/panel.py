@@ -151,7 +151,8 @@ def _wrapped(text: str, size_px: int, width: int) -> list[str]:
 def _scale_bar(
     draw: ImageDraw.ImageDraw, grid: Grid, scale: float, right: float, bottom: float
 ) -> None:
-    metres_per_px = grid.ground_resolution_m / scale
+    # Across the picture: its pixels may be a tenth longer one way than the other.
+    metres_per_px = float(grid.pixel_sides(grid.width_px / 2, grid.height_px / 2)[0]) / scale
     length = round_length_m(180 * metres_per_px)
     left = right - length / metres_per_px
     for width, colour in ((7, (0, 0, 0)), (3, INK[:3])):

@@ -98,7 +98,7 @@ class _Canvas:
     def __init__(self, grid: Grid, size: tuple[int, int], dataset: Dataset) -> None:
         self.grid, self.size, self.dataset = grid, size, dataset
         self.large = (size[0] * _OVERSAMPLING, size[1] * _OVERSAMPLING)
-        self.factor = self.large[0] / grid.width_px
+        self.factor = max(self.large) / max(grid.width_px, grid.height_px)
         self.image = Image.new("RGB", self.large, GROUND)
         self.draw = ImageDraw.Draw(self.image, "RGBA")
         self.labels: list[Label] = []
