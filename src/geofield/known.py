@@ -40,6 +40,7 @@ from geofield.model.written import (
     shapes_of_plain,
     unlisted,
 )
+from geofield.parts import in_parts
 from geofield.plan import Plan
 from geofield.strangers import is_geopackage
 from geofield.wording import NAME_CRS, SWAP
@@ -113,7 +114,7 @@ def known_rows(table: gpd.GeoDataFrame, name: str) -> gpd.GeoDataFrame:
     table = table.reset_index(drop=True)
     empty = np.asarray(table.geometry.isna() | table.geometry.is_empty)
     refuse_nowhere(table.geometry.to_numpy(), name)
-    rows = table[~empty].explode()
+    rows = in_parts(table[~empty])
     _understand_lengths(rows, name)
     rows = rows.reset_index(drop=True)
     rows.attrs[WITHOUT_SHAPE] = [int(row) + 1 for row in table.index[empty]]

@@ -26,6 +26,7 @@ from geofield.formats.foreign_tables import ID_COLUMNS, NAME_COLUMNS
 from geofield.formats.raw_tables import RawTable, raw_of, read_raw
 from geofield.formats.table_positions import LAT, LON, check_positions, degrees, found
 from geofield.model.place import position_words
+from geofield.parts import single_parts
 from geofield.settings import Settings
 from geofield.wording import NAME_CRS, cell_text, counted, unlike
 
@@ -140,13 +141,13 @@ def _shapes(raw: RawTable, geometry: pa.Array, source: CRS, notes: list[str]) ->
         shapes = shapely.force_2d(shapely.from_wkb(binary, on_invalid="fix"))
         shapes = joined(shapes, source)  # a parcel cut at 180 degrees is one
         shapes[shapely.is_empty(shapes)] = None
-        single, row = shapely.get_parts(shapes, return_index=True)
+        single, row = single_parts(shapes)
         # A row without shape is a place that fails and says so.
         absent = np.setdiff1d(np.arange(len(shapes)), row)
         kind = shapely.get_type_id(single)
         # A point beside a polygon in one row is no field of its own.
         point = (kind == 0) & ~np.isin(row, row[kind == 3])
-        usable = (point | (kind == 3)) & ~shapely.is_empty(single)
+        usable = point | (kind == 3)
         other += int((~usable).sum())
         single = np.append(single[usable], np.full(len(absent), None))
         row = np.append(row[usable], absent)

@@ -18,6 +18,7 @@ from geofield.finite import MEND_IT, finite
 from geofield.model import Field, FieldQuality
 from geofield.model.own_values import first_of
 from geofield.notes import warn
+from geofield.parts import in_parts
 from geofield.wording import SWAP, cell_text, counted, none_of
 
 if TYPE_CHECKING:
@@ -61,7 +62,7 @@ def field_from_boundary(
         When no parcel, or more than one of different outline, fits.
     """
     shaped = parcels[~(parcels.geometry.isna() | parcels.geometry.is_empty)]
-    rows = shapes = shaped.reset_index(drop=True).explode()
+    rows = shapes = in_parts(shaped.reset_index(drop=True))
     points = int((rows.geometry.geom_type == "Point").sum())
     rows = _outlines(rows)
     if rows.empty:

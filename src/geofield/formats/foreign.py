@@ -200,14 +200,14 @@ def refuse_layer(path: Path, layer: str | None) -> None:
 def layer_names(path: Path) -> list[str]:
     """The layers of a file, in order; without the points of a GPX file's lines."""
     import pyogrio
-    from pyogrio.errors import DataSourceError
+    from pyogrio.errors import DataLayerError, DataSourceError
 
     if path.suffix.lower() in PARQUET:
         return [path.stem]
     _look_at(path)
     try:
         names = [str(name) for name, kind in pyogrio.list_layers(path) if kind is not None]
-    except DataSourceError as error:
+    except (DataLayerError, DataSourceError) as error:
         raise unreadable(path, error) from error
     points = ("route_points", "track_points") if path.suffix.lower() == ".gpx" else ()
     return [name for name in names if name not in points]

@@ -50,6 +50,11 @@ _TRACK = ("track_no", "track", "swath")
 _SEGMENT = ("segment_no", "segment")
 #: Line strings and rings, as shapely counts types.
 _LINES = (1, 2)
+#: Words for trees, and the trees that stand in fields most.
+_TREE = re.compile(
+    r"(?i)\b(?:trees?|\w*b(?:aum|äume|aeume)|arbres?|oaks?|\w*eichen?|ch[eê]nes?|\w*buchen?|birch|"
+    r"birken?|pines?|kiefern?|fichten?|spruce|linden?|poplars?|pappeln?|walnut|olives?|oliviers?)\b"
+)
 #: How geofield names lines in formats without numbers.
 _OUR_NAME = re.compile(r"Track (\d+)(?:-(\d+))?")
 #: Larger numbers are none that anybody counts with, nor exact in all programs.
@@ -169,7 +174,7 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
     }
     data |= {
         "obstacle_no": list(known["obstacle_no"]),
-        "kind": _one_of(frame, path, "kind", schema.KINDS, np.where(is_point, "tree", "other")),
+        "kind": _one_of(frame, path, "kind", schema.KINDS, _kinds(frame, is_point)),
         "status": _one_of(frame, path, "status", schema.STATUSES, np.full(count, "added")),
         "radius_m": radius,
         "buffer_m": margin,
@@ -283,6 +288,19 @@ def _countable(values: np.ndarray) -> Any:
     return (values == np.round(values)) & (values >= 0) & (values <= _LARGEST)
 
 
+def _texts(series: pd.Series) -> list[str]:
+    return ["" if pd.isna(value) else str(value).strip() for value in series]
+
+
+def _kinds(frame: gpd.GeoDataFrame, is_point: np.ndarray) -> np.ndarray:
+    """What each is by its own word, in whatever language; points that say none are trees."""
+    series = column_like(frame, ("kind", "natural"))
+    said = [""] * len(frame) if series is None else _texts(series)
+    trees = [_TREE.search(text) is not None for text in said]
+    silent = np.array([not re.search("[^\\W\\d_]{2}", text) for text in said], bool)
+    return np.where(np.where(silent, is_point, trees), "tree", "other")
+
+
 def _one_of(
     frame: gpd.GeoDataFrame, path: Path, name: str, allowed: tuple[str, ...], default: np.ndarray
 ) -> list[str]:
@@ -290,7 +308,7 @@ def _one_of(
     series = column_like(frame, (name,))
     if series is None:
         return [str(value) for value in default]
-    said = ["" if pd.isna(value) else str(value).strip() for value in series]
+    said = _texts(series)
     taken = [
         word.lower() if word.lower() in allowed else str(other)
         for word, other in zip(said, default, strict=True)

@@ -174,10 +174,20 @@ def _csv(path: Path, texts: set[str]) -> RawTable:
     column = next((name for name in texts_in if name.lower() in _GEOMETRY), None)
     if column is None:
         return RawTable(path.name, table)
-    wkt = table[column].to_numpy()
-    shapes = shapely.from_wkt(wkt, on_invalid="ignore")
+    shapes = _of_texts(path, table[column].to_numpy())
     geometry = pa.array(shapely.to_wkb(shapes), pa.binary(), from_pandas=True)
     return RawTable(path.name, table.drop_columns(column), geometry, column, in_degrees=True)
+
+
+def _of_texts(path: Path, texts: Any) -> Any:
+    """Shapes of well-known text, none where it is none."""
+    try:
+        return shapely.from_wkt(texts, on_invalid="ignore")
+    except NotImplementedError:
+        raise FormatError(
+            f"{path} has shapes with arcs.",
+            hint="Make lines of them: ogr2ogr -nlt CONVERT_TO_LINEAR NAME.gpkg FILE",
+        ) from None
 
 
 def _parquet(path: Path) -> RawTable:

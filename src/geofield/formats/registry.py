@@ -11,7 +11,7 @@ from types import MappingProxyType
 from geofield.errors import FormatError, MissingFileError, UnknownFormatError
 from geofield.formats.catalogue import CATALOGUE
 from geofield.formats.format import Drop, Format
-from geofield.strangers import check_vector, is_geopackage
+from geofield.strangers import check_vector, is_geopackage, unreadable
 from geofield.wording import command
 
 __all__ = [
@@ -229,6 +229,8 @@ def _has_shapes(place: Path) -> bool:
         return any(kind is not None for _, kind in pyogrio.list_layers(place))
     except pyogrio.errors.DataSourceError:
         return False
+    except pyogrio.errors.DataLayerError as error:  # of a kind of shapes that pyogrio does not know
+        raise unreadable(place, error) from None
 
 
 def _opens(file: Path) -> bool:

@@ -29,6 +29,7 @@ from geofield.errors import FormatWarning
 from geofield.formats.foreign_tables import field_table, line_tables, obstacle_table
 from geofield.model.obstacles import numbered
 from geofield.notes import warn
+from geofield.parts import in_parts
 from geofield.wording import counted
 
 if TYPE_CHECKING:
@@ -180,11 +181,7 @@ def sort_out(
 
 
 def _parts(layer: RawLayer) -> list[_Part]:
-    frame = layer.frame
-    # A collection may hold multi-part shapes, or collections.
-    while frame.geom_type.str.startswith(("Multi", "GeometryCollection")).any():
-        frame = frame.explode(index_parts=False, ignore_index=True)
-        frame = frame[~frame.geometry.is_empty]
+    frame = in_parts(layer.frame).reset_index(drop=True)
     kinds = frame.geom_type.replace("LinearRing", "LineString")
     stands = np.zeros(len(frame), bool)
     for kind, columns, others in (
