@@ -10,6 +10,7 @@ import subprocess
 from pathlib import Path
 
 import geopandas as gpd
+import numpy as np
 import pytest
 import shapely
 
@@ -146,10 +147,10 @@ def test_a_drawing_is_read_with_the_crs_that_it_cannot_say(tmp_path):
     assert "--crs EPSG:" in refused.stderr
     done = geofield("import", tmp_path / "a.dxf", *place, "--crs", "EPSG:25832", "--json")
     assert done.returncode == 0, done.stderr
+    assert "a.dxf: 1 text left out" in done.stderr
     told = json.loads(done.stdout)
     assert told["rows"] == {"field": 1, "obstacles": 2}
     assert told["taken"] == [
-        "1 text left out",
         "SCHLAG: 1 polygon taken as the field",
         "BÄUME: 1 polygon taken as obstacles",
         "BÄUME: 1 point taken as obstacles",
@@ -160,6 +161,32 @@ def test_a_drawing_is_read_with_the_crs_that_it_cannot_say(tmp_path):
     assert outline.equals(shapely.Polygon(ring))
     middles = plan.table("obstacles").centroid
     assert middles.distance(shapely.Point(x + 60, y + 60)).min() < 0.01
+
+
+def test_a_drawing_is_read_alike_by_all(tmp_path):
+    """Only import knew it: of --obstacles a tank of 4 m was a ring, and its name a tree."""
+    x, y = 500000.0, 5600000.0
+    ring = list(shapely.box(x, y, x + 200, y + 150).exterior.coords)[:-1]
+    here, to = ("--crs", "EPSG:25832", "--spacing", 9, "-o"), tmp_path / "plan.gpkg"
+    drawing(tmp_path / "outline.dxf", closed_line("0", ring))
+    drawing(
+        tmp_path / "tank.dxf",
+        ("CIRCLE", "TANK", [(10, x + 60), (20, y + 60), (40, 4.0)]),
+        ("TEXT", "SCHRIFT", [(10, x + 90), (20, y + 70), (40, 5.0), (1, "Tank")]),
+    )
+    done = geofield(
+        "tracks", tmp_path / "outline.dxf", "--obstacles", tmp_path / "tank.dxf", *here, to
+    )
+    assert done.returncode == 0, done.stderr
+    assert "tank.dxf: 1 text left out" in done.stderr
+    plan = read_dataset(to)
+    assert plan.table("field").geometry.iloc[0].equals(shapely.Polygon(ring))
+    assert plan.table("obstacles").area.to_numpy() == pytest.approx([16 * np.pi], rel=1e-3)
+    both = closed_line("0", ring), ("CIRCLE", "TANK", [(10, x + 60), (20, y + 60), (40, 4.0)])
+    drawing(tmp_path / "both.dxf", *both)
+    refused = geofield("tracks", tmp_path / "both.dxf", *here, tmp_path / "other.gpkg")
+    assert "both.dxf has 2 layers: 0, TANK" in refused.stderr
+    assert "geofield import" in refused.stderr
 
 
 def test_a_drawing_of_ours_comes_back_where_its_prj_says(tmp_path):

@@ -1,21 +1,16 @@
 """DXF of lines for drawing programs: outline, obstacles, segments and gaps, a layer each.
 
 Coordinates are metres of the metric CRS; a DXF file has no place to say which one, so a
-``.prj`` lies beside it. Of other programs' drawings a closed line is an area.
+``.prj`` lies beside it; `geofield.formats.drawing` reads it, and those of other programs.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import shapely
 from pyproj import CRS
-from pyproj.exceptions import CRSError as NoCRS
 
 from geofield import schema
 from geofield.errors import FormatError
@@ -23,7 +18,6 @@ from geofield.formats.arrow import disk_hint, exact_geometry, gdal_config, writi
 from geofield.formats.foreign import RawLayer, read_foreign, read_vector
 from geofield.formats.terminal import avoided
 from geofield.model import Dataset
-from geofield.wording import counted
 
 #: DXF layer by layer of the schema.
 LAYERS = {
@@ -61,47 +55,7 @@ def write(dataset: Dataset, folder: Path, *, stem: str, options: Mapping[str, An
 
 
 def read(path: Path, *, crs: CRS | None = None) -> Dataset:
-    """The dataset in a DXF file, layer by layer: closed lines and circles are areas.
-
-    Written words are left out, and hatches where lines are drawn around them, as they mostly are;
-    of what is no part of the drawing (sheets of paper, points of dimensions) nothing is said.
-    """
-    with gdal_config(**_encoding(path)):
-        frame = read_vector(path)
-    frame = frame[frame["PaperSpace"].isna() & (frame["Layer"] != "Defpoints")]
-    shapes = np.asarray(frame.geometry.to_numpy(), dtype=object)
-    rings = shapely.is_ring(shapes) & (shapely.get_num_coordinates(shapes) > 3)
-    shapes[rings] = [shapely.Polygon(line) for line in shapes[rings]]
-    kinds = frame["SubClasses"].fillna("")
-    texts = np.asarray(kinds.str.contains("Text") | frame["Text"].notna()) & ~rings
-    hatches = np.asarray(kinds.str.contains("Hatch"))
-    texts &= ~hatches
-    aside = texts | (hatches & rings.any())
-    layers = frame[["Layer"]].set_geometry(shapes, crs=_said_beside(path))[~aside]
-    drawn = [RawLayer(str(name), of_one) for name, of_one in layers.groupby("Layer", sort=False)]
-    dataset = read_foreign(drawn, path, crs=crs)
-    words = [
-        counted(int(count), thing) + " left out"
-        for count, thing in ((texts.sum(), "text"), ((aside & hatches).sum(), "hatch"))
-        if count
-    ]
-    return replace(dataset, notes=(*words, *dataset.notes))
-
-
-def _encoding(path: Path) -> dict[str, str]:
-    """What GDAL is to be told of the letters: drawings since AutoCAD 2007 have UTF-8."""
-    with path.open("rb") as file:
-        version = re.search(rb"\$ACADVER\s+1\s+AC(\d+)", file.read(4096))
-    return {"DXF_ENCODING": "UTF-8"} if version and int(version[1]) >= 1021 else {}
-
-
-def _said_beside(path: Path) -> CRS | None:
-    """The CRS that a ``.prj`` beside a drawing says."""
-    beside = path.with_suffix(".prj")
-    if not beside.is_file():
-        return None
-    try:
-        said = CRS.from_wkt(beside.read_text(encoding="utf-8"))
-    except (NoCRS, UnicodeDecodeError):
-        return None
-    return CRS(said.to_epsg(min_confidence=70) or said)
+    """The dataset in a DXF file, layer by layer."""
+    drawn = read_vector(path)
+    layers = [RawLayer(str(name), of_one) for name, of_one in drawn.groupby("Layer", sort=False)]
+    return read_foreign(layers, path, crs=crs)

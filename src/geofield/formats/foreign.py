@@ -7,6 +7,7 @@ what the others are.
 from __future__ import annotations
 
 import warnings
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,7 +25,9 @@ from geofield.crs import LONLAT, metric_crs, parse_crs, refuse_outside, transfor
 from geofield.errors import EmptyFileError, FormatError, FormatWarning, SeveralFieldsError
 from geofield.finite import refuse_nowhere
 from geofield.formats.antimeridian import joined, unwrapped
+from geofield.formats.arrow import gdal_config
 from geofield.formats.catalogue import PARQUET
+from geofield.formats.drawing import drawn, encoding
 from geofield.formats.registry import refuse_no_rows
 from geofield.formats.row_crs import said_crs
 from geofield.formats.sorting import RawLayer, sort_out
@@ -65,8 +68,10 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
         refuse_layer(path, layer)
         return read_parquet(path)
     _look_at(path)
+    drawing = path.suffix.lower() == ".dxf"
     try:
-        with warnings.catch_warnings():
+        letters = gdal_config(**encoding(path)) if drawing else nullcontext()
+        with warnings.catch_warnings(), letters:
             # GDAL tells of each ring that is not closed; they are counted below.
             warnings.filterwarnings("ignore", "Non closed ring", RuntimeWarning)
             try:
@@ -85,6 +90,8 @@ def read_vector(path: Path, layer: str | None = None) -> gpd.GeoDataFrame:
             f"{path}: {layer or path.stem!r} is a table without geometry.",
             hint="Name a layer with shapes; positions are read from CSV with columns lat and lon.",
         )
+    if drawing:
+        return drawn(frame, path)
     if frame.crs is not None:
         said = said_crs(path, frame.crs, frame.geometry.to_numpy)
         frame = frame.set_crs(said, allow_override=True)

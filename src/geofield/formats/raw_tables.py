@@ -17,7 +17,7 @@ import shapely
 
 from geofield.errors import CRSError, FormatError, MissingFileError
 from geofield.formats.catalogue import PARQUET
-from geofield.formats.foreign import refuse_layer
+from geofield.formats.foreign import read_vector, refuse_layer
 from geofield.formats.gpkg_read import is_own
 from geofield.formats.registry import detect, files_of, refuse_no_rows
 from geofield.formats.row_crs import refuse_other_rows, said_crs
@@ -80,6 +80,8 @@ def read_raw(path: Path, *, layer: str | None, texts: Sequence[str | None]) -> R
         return _csv(path, {text.lower() for text in texts if text})
     if path.suffix.lower() in PARQUET:
         return _parquet(path)
+    if path.suffix.lower() == ".dxf":
+        return _drawing(path, layer)
     return _vector(path, layer)
 
 
@@ -122,10 +124,32 @@ def raw_of(frame: pd.DataFrame) -> RawTable:
         ) from None
     unnamed = [each for each in table.column_names if each.startswith("__index_level_")]
     table = table.drop_columns(unnamed)
-    if shapes is None:
-        return RawTable(name, table)
+    return RawTable(name, table) if shapes is None else _with_shapes(name, table, shapes)
+
+
+def _drawing(path: Path, layer: str | None) -> RawTable:
+    """A layer of a drawing."""
+    frame = read_vector(path)
+    layers = frame["Layer"].unique().tolist()
+    if layer is None and len(layers) > 1:
+        raise _several(path, layers)
+    frame = frame if layer is None else frame[_of_layer(path, layers, layer) == frame["Layer"]]
+    return _with_shapes(path.name, pa.table({"layer": frame["Layer"]}), frame.geometry)
+
+
+def _with_shapes(name: str, table: pa.Table, shapes: gpd.GeoSeries) -> RawTable:
     geometry = pa.array(shapely.to_wkb(shapes.to_numpy()), pa.binary(), from_pandas=True)
     return RawTable(name, table, geometry, str(shapes.name), shapes.crs)
+
+
+def _of_layer(path: Path, layers: Sequence[str], layer: str) -> str:
+    """A layer that there is."""
+    if layer not in layers:
+        raise FormatError(
+            f"{path} has no layer {layer!r}.{nearest(layer, layers)}",
+            hint=f"It has {', '.join(layers[:8])}.",
+        )
+    return layer
 
 
 def _csv(path: Path, texts: set[str]) -> RawTable:
@@ -232,10 +256,7 @@ def _vector(path: Path, layer: str | None) -> RawTable:
         if not len(listed):
             raise FormatError(f"{path} holds no layers.", hint=_ROWS)
         if layer is not None and layer not in listed[:, 0]:
-            raise FormatError(
-                f"{path} has no layer {layer!r}.{nearest(layer, layers)}",
-                hint=f"It has {', '.join(layers[:8])}.",
-            )
+            _of_layer(path, layers, layer)
         if layer is None and "field" in layers:
             layer = "field"
         if layer is None and len(layers) > 1:
