@@ -117,3 +117,20 @@ def test_a_pole_is_no_tree_and_an_oak_is_one(tmp_path):
     for name in ("a.gpkg", "b.gpkg"):
         found = gpd.read_file(tmp_path / name, layer="obstacles")
         assert found["kind"].tolist() == ["other"] * 2 + ["tree"] * 6
+
+
+def test_a_layer_of_trees_beside_one_called_field_is_told(tmp_path):
+    """Only the layer `field` was read, without a word, and tracks ran through the trees."""
+    file = tmp_path / "map.gpkg"
+    trees = gpd.GeoDataFrame({"radius_m": [4.0]}, geometry=[FIELD.centroid], crs=32633)
+    field = gpd.GeoDataFrame({"name": ["a"]}, geometry=[FIELD], crs=32633)
+    field.to_file(file, layer="field")
+    trees[:0].to_file(file, layer="trees")
+    given = ("--spacing", 9)
+    geofield(tmp_path, "tracks", "map.gpkg", *given, "-o", "plan.gpkg")
+    trees.to_file(file, layer="trees")
+    for command in (("tracks", "-o", "other.gpkg"), ("batch", "--out", "farm")):
+        told = geofield(tmp_path, *command, "map.gpkg", *given, code=1)
+        assert "map.gpkg has 2 layers: field, trees" in told
+    geofield(tmp_path, "import", "map.gpkg", "-o", "found.gpkg")
+    assert len(gpd.read_file(tmp_path / "found.gpkg", layer="obstacles")) == 1

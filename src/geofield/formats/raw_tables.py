@@ -17,7 +17,7 @@ import shapely
 
 from geofield.errors import CRSError, FormatError, MissingFileError
 from geofield.formats.catalogue import PARQUET
-from geofield.formats.foreign import read_vector, refuse_layer
+from geofield.formats.foreign import has_rows, read_vector, refuse_layer
 from geofield.formats.gpkg_read import is_own
 from geofield.formats.registry import detect, files_of, refuse_no_rows
 from geofield.formats.row_crs import refuse_other_rows, said_crs
@@ -244,6 +244,26 @@ def _parquet(path: Path) -> RawTable:
     return RawTable(path.name, rest, geometry, name, crs)
 
 
+def _layer(path: Path, layer: str | None) -> str | None:
+    """The layer that is asked for, or the only one in which something is."""
+    import pyogrio
+
+    listed = pyogrio.list_layers(path)
+    layers = [str(name) for name, kind in listed if kind is not None]
+    if not len(listed):
+        raise FormatError(f"{path} holds no layers.", hint=_ROWS)
+    if layer is not None and layer not in listed[:, 0]:
+        _of_layer(path, layers, layer)
+    if layer is None and "field" in layers and is_own(path):
+        return "field"  # what stands there is known by the other layers, and read with it
+    if layer is None and len(layers) > 1:
+        filled = [each for each in layers if has_rows(path, each)]
+        if len(filled) > 1:
+            raise _several(path, filled)
+        return (filled or layers)[0]
+    return layer
+
+
 def _vector(path: Path, layer: str | None) -> RawTable:
     import pyogrio
     from pyogrio.errors import DataLayerError, DataSourceError
@@ -251,16 +271,7 @@ def _vector(path: Path, layer: str | None) -> RawTable:
     check_vector(path)
     refuse_no_rows(path)
     try:
-        listed = pyogrio.list_layers(path)
-        layers = [str(name) for name, kind in listed if kind is not None]
-        if not len(listed):
-            raise FormatError(f"{path} holds no layers.", hint=_ROWS)
-        if layer is not None and layer not in listed[:, 0]:
-            _of_layer(path, layers, layer)
-        if layer is None and "field" in layers:
-            layer = "field"
-        if layer is None and len(layers) > 1:
-            raise _several(path, layers)
+        layer = _layer(path, layer)
         meta, table = pyogrio.read_arrow(path, layer=layer)
         try:
             table.validate(full=True)
