@@ -134,3 +134,14 @@ def test_a_layer_of_trees_beside_one_called_field_is_told(tmp_path):
         assert "map.gpkg has 2 layers: field, trees" in told
     geofield(tmp_path, "import", "map.gpkg", "-o", "found.gpkg")
     assert len(gpd.read_file(tmp_path / "found.gpkg", layer="obstacles")) == 1
+
+
+def test_a_waypoint_that_is_named_a_pole_is_no_tree(tmp_path):
+    names = ["Power pole 3", "Hochspannungsmast", "Tree at the pond", "W 12", None]
+    points = [shapely.Point(X + 20 * at, Y + 50) for at in range(1, 6)]
+    frame = gpd.GeoDataFrame({"name": names}, geometry=points, crs=32633).to_crs(4326)
+    frame.to_file(tmp_path / "marks.gpx", layer="waypoints", driver="GPX")
+    written(tmp_path / "field.gpkg", [FIELD])
+    geofield(tmp_path, "import", "field.gpkg", "marks.gpx", "-o", "plan.gpkg")
+    found = gpd.read_file(tmp_path / "plan.gpkg", layer="obstacles")
+    assert found["kind"].tolist() == ["other", "other", "tree", "tree", "tree"]

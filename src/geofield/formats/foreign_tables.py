@@ -55,6 +55,12 @@ _TREE = re.compile(
     r"(?i)\b(?:trees?|\w*b(?:aum|äume|aeume)|arbres?|oaks?|\w*eichen?|ch[eê]nes?|\w*buchen?|birch|"
     r"birken?|pines?|kiefern?|fichten?|spruce|linden?|poplars?|pappeln?|walnut|olives?|oliviers?)\b"
 )
+#: Other things that people mark by a point and a name.
+_NO_TREE = re.compile(
+    r"(?i)\b(?:\w*(?:poles?|mast(?:en)?|pylons?|hydrant(?:en)?|pfosten|pfahl|brunnen|schacht|zaun|"
+    r"teich|mauer|hütte|stein)|posts?|wells?|manholes?|ponds?|fences?|walls?|rocks?|stones?|tanks?|"
+    r"huts?|poteaux?|puits|mares?|clôtures?|murs?|rochers?|fels(?:en)?)\b"
+)
 #: How geofield names lines in formats without numbers.
 _OUR_NAME = re.compile(r"Track (\d+)(?:-(\d+))?")
 #: Larger numbers are none that anybody counts with, nor exact in all programs.
@@ -293,12 +299,16 @@ def _texts(series: pd.Series) -> list[str]:
 
 
 def _kinds(frame: gpd.GeoDataFrame, is_point: np.ndarray) -> np.ndarray:
-    """What each is by its own word, in whatever language; points that say none are trees."""
-    series = column_like(frame, ("kind", "natural"))
-    said = [""] * len(frame) if series is None else _texts(series)
-    trees = [_TREE.search(text) is not None for text in said]
-    silent = np.array([not re.search("[^\\W\\d_]{2}", text) for text in said], bool)
-    return np.where(np.where(silent, is_point, trees), "tree", "other")
+    """What each is by its own word, or else its name; points that say neither are trees."""
+    kinds, names = (column_like(frame, each) for each in (("kind", "natural"), NAME_COLUMNS))
+    said, called = ([""] * len(frame) if each is None else _texts(each) for each in (kinds, names))
+    found = []
+    for kind, name, point in zip(said, called, is_point, strict=True):
+        tree = point and (_TREE.search(name) is not None or not _NO_TREE.search(name))
+        if re.search(r"[^\W\d_]{2}", kind):
+            tree = _TREE.search(kind) is not None
+        found.append("tree" if tree else "other")
+    return np.array(found, object)
 
 
 def _one_of(
