@@ -145,3 +145,17 @@ def test_a_waypoint_that_is_named_a_pole_is_no_tree(tmp_path):
     geofield(tmp_path, "import", "field.gpkg", "marks.gpx", "-o", "plan.gpkg")
     found = gpd.read_file(tmp_path / "plan.gpkg", layer="obstacles")
     assert found["kind"].tolist() == ["other", "other", "tree", "tree", "tree"]
+
+
+@pytest.mark.parametrize("column", ["width", "Diameter", "radius_ft"])
+def test_a_size_that_is_not_read_is_told(tmp_path, column):
+    """A ditch of 4 m was a line of 20 cm without a word."""
+    ditch = shapely.LineString([(X + 50, Y + 20), (X + 50, Y + 80)])
+    frame = gpd.GeoDataFrame({column: [4.0], "kind": "ditch"}, geometry=[ditch], crs=32633)
+    frame.to_file(tmp_path / "ditch.gpkg")
+    written(tmp_path / "field.gpkg", [FIELD])
+    around = ("tracks", "field.gpkg", "--obstacles", "ditch.gpkg", "--spacing", 9)
+    told = geofield(tmp_path, *around, "-o", "plan.gpkg")
+    assert f"{column} of obstacles may say how wide they are" in told
+    frame.rename(columns={column: "radius_m"}).to_file(tmp_path / "ditch.gpkg")
+    assert "how wide" not in geofield(tmp_path, *around, "-o", "other.gpkg")

@@ -61,6 +61,8 @@ _NO_TREE = re.compile(
     r"teich|mauer|hütte|stein)|posts?|wells?|manholes?|ponds?|fences?|walls?|rocks?|stones?|tanks?|"
     r"huts?|poteaux?|puits|mares?|clôtures?|murs?|rochers?|fels(?:en)?)\b"
 )
+#: What columns are called that say how wide something is, but not as a radius in metres.
+_SIZE = re.compile("(?i)width|breite|largeur|diam|durchmesser|crown|krone|radius_?(?!m$|px$).")
 #: How geofield names lines in formats without numbers.
 _OUR_NAME = re.compile(r"Track (\d+)(?:-(\d+))?")
 #: Larger numbers are none that anybody counts with, nor exact in all programs.
@@ -143,6 +145,7 @@ def obstacle_table(frame: gpd.GeoDataFrame, crs: CRS, path: Path) -> gpd.GeoData
     radius, margin = numbers_like(frame, RADIUS_COLUMNS), numbers_like(frame, BUFFER_COLUMNS)
     is_point = shapely.get_type_id(geometry) == shapely.GeometryType.POINT.value
     radius[~(np.isfinite(radius) & (radius > 0))] = np.nan
+    _tell_sizes(frame, ~(radius > 0) & (shapely.get_dimensions(geometry) < 2), path)
     unsized = is_point & np.isnan(radius)
     if few := int(unsized.sum()):
         warn(
@@ -292,6 +295,18 @@ def _numbers_in_names(frame: gpd.GeoDataFrame) -> tuple[np.ndarray, np.ndarray]:
 def _countable(values: np.ndarray) -> Any:
     """Which numbers are whole, and not too large to count with."""
     return (values == np.round(values)) & (values >= 0) & (values <= _LARGEST)
+
+
+def _tell_sizes(frame: gpd.GeoDataFrame, unsized: np.ndarray, path: Path) -> None:
+    """Tell of columns that say how wide points and lines are, in words that are not read."""
+    there = frame[unsized].dropna(axis="columns", how="all").columns
+    sizes = [str(name) for name in there if _SIZE.search(str(name))]
+    if sizes:
+        warn(
+            f"{path.name}: {some_of(sizes, 5)} of obstacles may say how wide they are, and "
+            "what is read is radius_m: metres, of a line from its middle.",
+            FormatWarning,
+        )
 
 
 def _texts(series: pd.Series) -> list[str]:
