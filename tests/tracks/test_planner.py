@@ -167,6 +167,27 @@ def test_gaps_name_every_cause() -> None:
     assert border["obstacle_no"].isna().all()
 
 
+def test_gaps_name_what_stands_on_either_side_of_the_track() -> None:
+    # Along 6 m: gaps are where both sides of the track are barred, from wherever they are so.
+    way = [(X, Y), (X + 10.0, Y)]
+    barred = [box(20, 6, 60, 8), box(30, 4, 40, 6), box(55, 4, 70, 6)]
+    planned = plan_tracks(box(0, 0, 100, 16), barred, crs=CRS, spacing_m=3.0, direction=way)
+    gaps = planned.gaps[planned.gaps["length_m"] < 20.0]
+    gaps = gaps[gaps.geometry.bounds["miny"].sub(Y + 6.0).abs() < 1e-6]
+    assert gaps["length_m"].tolist() == pytest.approx([10.0, 5.0], abs=1e-6)
+    assert gaps["cause"].tolist() == ["obstacles 1, 2", "obstacles 1, 3"]
+
+
+def test_what_touches_a_gap_with_a_corner_is_no_cause() -> None:
+    field: Any = shapely.difference(box(0, 0, 100, 16), box(40, 2, 50, 16))
+    corner = Polygon([(X + 42, Y + 4), (X + 48, Y + 4), (X + 45, Y + 6)])
+    planned = plan_tracks(
+        field, [corner], crs=CRS, spacing_m=3.0, direction=[(X, Y), (X + 10.0, Y)]
+    )
+    touched = planned.gaps.distance(shapely.Point(X + 45, Y + 6)) < 1e-6
+    assert planned.gaps.loc[touched, "cause"].tolist() == ["border"]
+
+
 def test_tracks_keep_one_number_across_a_notch() -> None:
     field: Any = shapely.difference(box(0, 0, 100, 40), box(40, 9, 60, 40))
     tracks = plan_tracks(field, crs=CRS, spacing_m=4.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geofield.tracks.clip import TOUCH_M, Crossings, Pieces
 from geofield.tracks.frame import FloatArray
@@ -12,26 +13,45 @@ from geofield.tracks.shapes import FIELD, IntArray
 def gap_causes(pieces: Pieces, crossings: Crossings) -> tuple[IntArray, IntArray]:
     """Name what lies in each gap: the piece before it, and an obstacle, by their indices.
 
-    The second is ``FIELD`` where the gap leaves the field. Pairs are unique and sorted.
+    It lies there along some of the gap, on either side of the track, wherever it begins. The second
+    is ``FIELD`` where the gap leaves the field. Pairs are unique and sorted.
     """
-    is_field = crossings.owner == FIELD
-    # A cause begins where an obstacle is entered or the field is left.
-    begins = (np.where(is_field, -1, 1) * crossings.enters > 0) & ~crossings.free
-    at = np.flatnonzero(begins)
-    piece = crossings.last_kept[crossings.raw_piece[at]]
-    fits = (piece >= 0) & (piece < len(pieces) - 1)
-    at, piece = at[fits], piece[fits]
-    fits = (
-        (pieces.track[piece] == crossings.track[at])
-        & (pieces.track[piece + 1] == crossings.track[at])
-        & (crossings.u[at] >= pieces.end[piece] - TOUCH_M)
-        & (crossings.u[at] < pieces.start[piece + 1] - TOUCH_M)
-    )
-    at, piece = at[fits], piece[fits]
-    owner = crossings.owner[at]
     width = int(crossings.owner.max(initial=0)) + 2
-    pairs = np.unique(piece * width + owner + 1)
+    found = np.concatenate([
+        piece * width + owner + 1
+        for piece, owner in (_along_gaps(pieces, crossings, each) for each in crossings.sweeps)
+    ])  # fmt: skip
+    pairs = np.unique(found)
     return pairs // width, pairs % width - 1
+
+
+def _along_gaps(
+    pieces: Pieces, crossings: Crossings, sweep: NDArray[np.int8]
+) -> tuple[IntArray, IntArray]:
+    """What one sweep meets in gaps: the piece before each, and what is there."""
+    mine = np.flatnonzero(np.broadcast_to(sweep, crossings.u.shape))
+    mine = mine[np.lexsort((crossings.track[mine], crossings.owner[mine]))]
+    owner, track = crossings.owner[mine], crossings.track[mine]
+    # A ring is left as often as it is entered: each owner begins each track with nothing.
+    depth = np.cumsum(crossings.enters[mine], dtype=np.int64)
+    stands = np.where(owner == FIELD, depth <= 0, depth > 0)[:-1]
+    at = np.flatnonzero(stands & (owner[1:] == owner[:-1]) & (track[1:] == track[:-1]))
+    begin, end = mine[at], mine[at + 1]
+    # The gaps after the piece that it begins in or behind, up to that after the one it ends so.
+    before = np.maximum(crossings.last_kept[crossings.raw_piece[begin]], 0)
+    number = crossings.last_kept[crossings.raw_piece[end]] - before + 1
+    one = np.repeat(np.arange(len(at)), number)
+    piece = before[one] + np.arange(len(one)) - np.repeat(np.cumsum(number) - number, number)
+    fits = piece < len(pieces) - 1
+    one, piece = one[fits], piece[fits]
+    along = np.minimum(crossings.u[end[one]], pieces.start[piece + 1])
+    along -= np.maximum(crossings.u[begin[one]], pieces.end[piece])
+    fits = (
+        (pieces.track[piece] == track[at[one]])
+        & (pieces.track[piece + 1] == track[at[one]])
+        & (along > TOUCH_M)
+    )
+    return piece[fits], owner[at[one[fits]]]
 
 
 def obstacle_losses(crossings: Crossings, obstacle_count: int) -> FloatArray:
