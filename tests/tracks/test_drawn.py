@@ -57,6 +57,16 @@ def test_a_drawn_track_is_driven_along_it_up_to_what_stands_there(
     assert gaps["cause"].tolist() == ["obstacle 1"] * (len(expected_m) - 1)
 
 
+@pytest.mark.parametrize("circles", [[], [(60, 0)]], ids=["nothing there", "beside it"])
+def test_a_gap_is_due_to_what_the_line_left_out_of_it_meets(
+    circles: list[tuple[float, float]],
+) -> None:
+    tracks = tracks_with([[(50, 40), (50, -20), (70, -20), (70, 40)]], circles)
+    gaps = tracks.gaps[tracks.gaps["track_no"] == 11]
+    assert gaps["length_m"].tolist() == pytest.approx([20.0])
+    assert gaps["cause"].tolist() == ["border"]
+
+
 def test_added_tracks_are_numbered_on_without_a_gap() -> None:
     tracks = tracks_with([[(10, 12), (90, 12)], [(10, 14), (90, 14)], [(10, 16), (90, 16)]], [])
     assert tracks.lines["track_no"].tolist() == list(range(1, 14))

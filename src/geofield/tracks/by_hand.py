@@ -39,6 +39,8 @@ _NEAR, _ALIKE, _TURNED_DEG = 0.25, 0.02, 2.0
 _THIN_M, _LONGER_M = 0.01, 0.01
 #: Quarter circles of an obstacle have so many sides, laid around it: under a millimetre at 8 m.
 _SIDES = 64
+#: A line touches what it runs along for no longer, metres.
+_TOUCH_M = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,13 +238,20 @@ def with_drawn(
     rows, gaps = [], []
     for one in drawn:
         lines = parts_of(one.drawn)
-        pieces = [piece for line in lines for piece in _cut(line, free) if piece.length >= least]
-        rows += [(one.track_no, no, piece) for no, piece in enumerate(pieces, 1)]
-        for no, (before, after) in enumerate(pairwise(pieces), 1):
-            way = shapely.LineString([before.coords[-1], after.coords[0]])
-            inside = tracks.outline is None or tracks.outline.covers(way)
-            met = [int(numbers[at]) for at in np.flatnonzero(shapely.intersects(shapes, way))]
-            met += [] if inside else [BORDER]
+        corners, at = shapely.get_coordinates(lines), 0
+        pieces = []
+        for line in lines:
+            cut = _cut(line, free)
+            pieces += [(piece, at + a, at + b) for piece, a, b in cut if piece.length >= least]
+            at += len(line.coords)
+        rows += [(one.track_no, no, piece) for no, (piece, *_) in enumerate(pieces, 1)]
+        for no, ((before, _, last), (after, first, _)) in enumerate(pairwise(pieces), 1):
+            begin, end = before.coords[-1], after.coords[0]
+            left_out = shapely.LineString([begin, *corners[last + 1 : first + 1], end])
+            met = [int(numbers[which]) for which in np.flatnonzero(_along(left_out, shapes))]
+            if tracks.outline is not None and left_out.difference(tracks.outline).length > _TOUCH_M:
+                met.append(BORDER)
+            way = shapely.LineString([begin, end])
             gaps.append((one.track_no, no, way, *cause_in_words(met or [BY_HAND])))
     return _joined(tracks, rows, gaps)
 
@@ -281,10 +290,18 @@ def _shapes(shapes: ObstacleShapes | None) -> Any:
     return np.concatenate([polygons_around(shapes.circles, _SIDES), shapes.polygons])
 
 
-def _cut(line: Any, free: Any) -> list[Any]:
-    """The pieces of a line in the free area, along it, wherever it crosses or follows itself."""
+def _along(line: Any, shapes: Any) -> Any:
+    """Which shapes a line runs through, and does not only touch."""
+    return shapely.length(shapely.intersection(shapes, line)) > _TOUCH_M
+
+
+def _cut(line: Any, free: Any) -> list[tuple[Any, int, int]]:
+    """The pieces of a line in the free area, along it, wherever it crosses or follows itself.
+
+    With the legs of the line, from 0, that each begins and ends on.
+    """
     if free is None or free.covers(line):
-        return [line]
+        return [(line, 0, len(line.coords) - 2)]
     corners = shapely.get_coordinates(line)
     legs = np.asarray(shapely.linestrings(np.stack((corners[:-1], corners[1:]), axis=1)))
     cut = ~shapely.covers(free, legs)
@@ -295,10 +312,11 @@ def _cut(line: Any, free: Any) -> list[Any]:
     ends = np.stack([shapely.get_coordinates(shapely.get_point(parts, at)) for at in (0, -1)], 1)
     along = np.einsum("pei,pi->pe", ends, np.diff(corners, axis=0)[leg])
     ends = np.where((along[:, 0] > along[:, 1])[:, None, None], ends[:, ::-1], ends)
-    ends = ends[np.lexsort((along.min(axis=1), leg))]
+    order = np.lexsort((along.min(axis=1), leg))
+    ends, leg = ends[order], leg[order]
     breaks = np.flatnonzero((ends[1:, 0] != ends[:-1, 1]).any(axis=1)) + 1
-    runs = np.split(ends, breaks) if len(ends) else []
-    return [shapely.LineString([run[0, 0], *run[:, 1]]) for run in runs]
+    runs = zip(np.split(ends, breaks), np.split(leg, breaks), strict=True) if len(ends) else ()
+    return [(shapely.LineString([run[0, 0], *run[:, 1]]), on[0], on[-1]) for run, on in runs]
 
 
 def _joined(tracks: Tracks, rows: Sequence[Any], gaps: Sequence[Any]) -> Tracks:
