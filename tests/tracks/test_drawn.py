@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 import shapely
 
+from geofield.errors import TrackWarning
 from geofield.model.track_edits import TrackEdit, TrackEdits
 from geofield.model.tracks import Tracks
 from geofield.tracks import plan_tracks
 
 CORNER = np.array([500_000.0, 5_600_000.0])
 RADIUS = 3.0
+HOW: Any = {
+    "crs": "+proj=tmerc +lon_0=15 +k=1 +x_0=500000 +datum=WGS84 +units=m",
+    "spacing_m": 10.0,
+    "direction": 90,
+}
 
 
 def tracks_with(drawn: list[Any], circles: list[tuple[float, float]]) -> Tracks:
@@ -22,13 +29,16 @@ def tracks_with(drawn: list[Any], circles: list[tuple[float, float]]) -> Tracks:
         TrackEdit(7, drawn=shapely.MultiLineString([CORNER + line]).wkt) for line in drawn
     )
     return plan_tracks(
-        shapely.box(*CORNER, *(CORNER + 100.0)),
-        [shapely.Point(CORNER + one).buffer(RADIUS, quad_segs=64) for one in circles],
-        crs="+proj=tmerc +lon_0=15 +k=1 +x_0=500000 +datum=WGS84 +units=m",
-        spacing_m=10.0,
-        direction=90,
+        moved(shapely.box(0, 0, 100, 100)),
+        [moved(shapely.Point(one).buffer(RADIUS, quad_segs=64)) for one in circles],
         edits=TrackEdits(edits),
+        **HOW,
     )
+
+
+def moved(shape: Any) -> Any:
+    """A shape to where the field is."""
+    return shapely.transform(shape, lambda xy: xy + CORNER)
 
 
 @pytest.mark.parametrize(
@@ -70,3 +80,25 @@ def test_a_gap_is_due_to_what_the_line_left_out_of_it_meets(
 def test_added_tracks_are_numbered_on_without_a_gap() -> None:
     tracks = tracks_with([[(10, 12), (90, 12)], [(10, 14), (90, 14)], [(10, 16), (90, 16)]], [])
     assert tracks.lines["track_no"].tolist() == list(range(1, 14))
+
+
+def test_a_track_that_was_beyond_the_border_for_a_while_is_drawn_among_the_others_again() -> None:
+    """The plan failed where a later one had stayed in use: they came in another order."""
+    field, smaller = shapely.box(0, 0, 100, 100), shapely.box(0, 0, 100, 70)
+    planned = plan_tracks(moved(field), **HOW)
+    # The half of each, turned a little.
+    bent = [
+        shapely.LineString([line.coords[0], line.centroid.coords[0] + np.array((0, 2))])
+        for line in planned.segments.geometry
+    ]
+    edited = replace(
+        planned, written=planned._written(), segments=planned.segments.set_geometry(bent)
+    )
+    edits = edited.edits_since(planned.edits)
+    whole = plan_tracks(moved(field), edits=edits, **HOW)
+    with pytest.warns(TrackWarning, match="3 tracks that you edited are of another layout"):
+        fewer = plan_tracks(moved(smaller), edits=edits, **HOW)
+    again = plan_tracks(moved(field), edits=fewer.edits, **HOW)
+    assert len(again.lines) == 10
+    assert again.lines.equals(whole.lines)
+    assert again.segments.equals(whole.segments)

@@ -113,8 +113,8 @@ def on_layout(
             number += 1
         taken.add(number)
         kept.append(one._replace(track_no=number))
-    drawn = [one for one in kept if one.drawn is not None]
     kept.sort(key=lambda one: one.track_no)
+    drawn = [one for one in kept if one.drawn is not None]
     in_use = TrackEdits(tuple(kept), tuple(apart), edits.beside)
     return OnLayout(in_use, _bars(bars, owner), drawn, whole)
 
