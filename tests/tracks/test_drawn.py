@@ -77,6 +77,19 @@ def test_a_gap_is_due_to_what_the_line_left_out_of_it_meets(
     assert gaps["cause"].tolist() == ["border"]
 
 
+def test_what_an_obstacle_costs_a_drawn_line_is_told() -> None:
+    # Beside the first, through two that overlap, and out of the field to the last.
+    line = [(60, 50), (20, 50), (20, 40), (60, 40), (60, 95), (-30, 95)]
+    circles = [(40.0, 45.0), (60.0, 70.0), (60.0, 74.0), (-10.0, 95.0)]
+    before, after = (tracks_with(drawn, circles) for drawn in ([], [line]))
+    lost_m = [one.length_m for one in after.losses]
+    more_m = np.array(lost_m) - [one.length_m for one in before.losses]
+    assert more_m.tolist() == pytest.approx([0, 5, 5, 0], abs=1e-2)
+    whole_m = after.segments["length_m"].sum() + sum(lost_m)
+    percent = [one.percent for one in after.losses]
+    assert percent == pytest.approx([100 * each / whole_m for each in lost_m])
+
+
 def test_added_tracks_are_numbered_on_without_a_gap() -> None:
     tracks = tracks_with([[(10, 12), (90, 12)], [(10, 14), (90, 14)], [(10, 16), (90, 16)]], [])
     assert tracks.lines["track_no"].tolist() == list(range(1, 14))

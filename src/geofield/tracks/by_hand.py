@@ -23,9 +23,11 @@ from geofield.model.obstacles import ObstacleShapes, polygons_around
 from geofield.model.own_values import with_own_values
 from geofield.model.segment_values import values_in, with_values
 from geofield.model.track_edits import TrackEdit, TrackEdits, parts_of
+from geofield.model.track_statistics import ObstacleLoss
 from geofield.model.tracks import Tracks
 from geofield.model.tracks_written import among, as_text
 from geofield.tracks.frame import FloatArray, TrackFrame, true_heading_deg
+from geofield.tracks.losses import by_number, losses_along
 from geofield.tracks.shapes import Edges
 from geofield.tracks.tables import BORDER, BY_HAND, cause_in_words, line_columns
 
@@ -235,9 +237,10 @@ def with_drawn(
     shapes = _shapes(tracks.shapes)
     numbers = () if tracks.shapes is None else (*tracks.shapes.circle_no, *tracks.shapes.polygon_no)
     least = max(min_segment_m, 1e-3) * tracks.ground_scale
-    rows, gaps = [], []
+    rows, gaps, whole = [], [], []
     for one in drawn:
         lines = parts_of(one.drawn)
+        whole += lines
         corners, at = shapely.get_coordinates(lines), 0
         pieces = []
         for line in lines:
@@ -253,7 +256,24 @@ def with_drawn(
                 met.append(BORDER)
             way = shapely.LineString([begin, end])
             gaps.append((one.track_no, no, way, *cause_in_words(met or [BY_HAND])))
-    return _joined(tracks, rows, gaps)
+    joined = _joined(tracks, rows, gaps)
+    if free is None or not numbers:
+        return joined
+    return replace(joined, losses=_with_losses(joined, whole, shapes, numbers))
+
+
+def _with_losses(
+    tracks: Tracks, drawn: Sequence[Any], shapes: Any, numbers: Sequence[int]
+) -> tuple[ObstacleLoss, ...]:
+    """What obstacles cost of the layout and of what was drawn."""
+    assert tracks.outline is not None  # noqa: S101 - what was drawn was cut at it
+    legs = [leg for line in drawn for leg in pairwise(line.coords)]
+    lost = losses_along(np.asarray(shapely.linestrings(legs)), tracks.outline, shapes)
+    return by_number(
+        [*(one.obstacle_no for one in tracks.losses), *numbers],
+        np.array([*(one.length_m for one in tracks.losses), *(lost / tracks.ground_scale)]),
+        float(tracks.segments["length_m"].sum()),
+    )
 
 
 def with_own(tracks: Tracks, edits: TrackEdits) -> Tracks:

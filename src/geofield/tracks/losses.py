@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import Polygon, STRtree
+
+from geofield.model.track_statistics import ObstacleLoss
 from geofield.tracks.clip import TOUCH_M, Crossings, Pieces
 from geofield.tracks.frame import FloatArray
 from geofield.tracks.shapes import FIELD, IntArray
@@ -83,3 +88,37 @@ def obstacle_losses(crossings: Crossings, obstacle_count: int) -> FloatArray:
         for enters, sums in zip(each, before, strict=True)
     )
     return np.maximum(lost, 0.0)
+
+
+def losses_along(legs: Any, outline: Polygon, shapes: Any) -> FloatArray:
+    """Length of straight lines lost to each of some shapes within a field, units of their CRS."""
+    areas = np.array([outline, *shapes], dtype=object)
+    leg, owner = STRtree(areas).query(legs, predicate="intersects")
+    parts, at = shapely.get_parts(shapely.intersection(legs[leg], areas[owner]), return_index=True)
+    at, parts = at[(long := shapely.length(parts) > 0.0)], parts[long]
+    ends = [shapely.line_locate_point(legs[leg[at]], shapely.get_point(parts, k)) for k in (0, -1)]
+    track, u = np.repeat(leg[at], 2), np.sort(ends, axis=0).T.ravel()
+    order = np.lexsort((u, track))
+    none = np.zeros(len(u), np.int64)
+    enters = np.tile(np.array([1, -1], np.int8), len(at))
+    crossings = Crossings(
+        track[order],
+        u[order],
+        enters[order],
+        np.repeat(owner[at] - 1, 2)[order],
+        none > 0,
+        none,
+        none,
+        (np.ones(1, np.int8),),
+    )
+    return obstacle_losses(crossings, len(shapes))
+
+
+def by_number(numbers: Any, lost_m: FloatArray, driven_m: float) -> tuple[ObstacleLoss, ...]:
+    """What each obstacle costs, by its number: its parts share one."""
+    whole_m = driven_m + float(lost_m.sum())
+    each, row = np.unique(np.asarray(numbers, np.int64), return_inverse=True)
+    return tuple(
+        ObstacleLoss(int(no), float(m), 100.0 * float(m) / whole_m if whole_m else 0.0)
+        for no, m in zip(each.tolist(), np.bincount(row, lost_m, len(each)).tolist(), strict=True)
+    )

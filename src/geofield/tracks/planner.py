@@ -18,7 +18,6 @@ from geofield.model.field import Field
 from geofield.model.frame import along_frame
 from geofield.model.obstacles import ObstacleShapes
 from geofield.model.track_edits import TrackEdits
-from geofield.model.track_statistics import ObstacleLoss
 from geofield.model.tracks import Tracks
 from geofield.notes import warn
 from geofield.tracks.blocks import obstacle_shapes
@@ -35,7 +34,7 @@ from geofield.tracks.headland import (
     unworked_note,
 )
 from geofield.tracks.layout import LastStrip, Strips
-from geofield.tracks.losses import obstacle_losses
+from geofield.tracks.losses import by_number, obstacle_losses
 from geofield.tracks.outline import (
     clean_outline,
     metric,
@@ -344,9 +343,6 @@ def _tracks(
     ends = segment_ends(pieces, positions, frame)
     segments = segment_table(ends, track_no, segment_no, length_m, crs)
     lost = obstacle_losses(crossings, len(obstacle_no))
-    whole = float(length_m.sum() + lost.sum())
-    numbers, row = np.unique(obstacle_no, return_inverse=True)
-    per_number = np.bincount(row, weights=lost, minlength=len(numbers))
     blocked = len(positions) - barred_count - len(np.unique(pieces.track))
     return Tracks(
         lines=line_table(ends, track_no, length_m, heading_deg=heading_deg, step_m=step_m, crs=crs),
@@ -364,9 +360,6 @@ def _tracks(
         outline=outline,
         shapes=shapes,
         blocked_count=blocked,
-        losses=tuple(
-            ObstacleLoss(int(no), float(m), 100.0 * float(m) / whole if whole else 0.0)
-            for no, m in zip(numbers.tolist(), per_number.tolist(), strict=True)
-        ),
+        losses=by_number(obstacle_no, lost, float(length_m.sum())),
         **rest,
     )
