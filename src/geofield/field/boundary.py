@@ -108,8 +108,6 @@ def _tell_inside(shapes: gpd.GeoDataFrame, chosen: gpd.GeoDataFrame) -> None:
     parcel = chosen.geometry.iloc[0]
     near = shapes[finite(shapes.geometry.to_numpy())]
     near = near[near.geometry.intersects(shapely.envelope(parcel))]
-    # Its border may lie there as a line again, the same parcel as of another year.
-    inner = parcel.buffer(-0.01 * np.sqrt(parcel.area))
     other = near.geometry.to_numpy()
     lines = shapely.get_dimensions(other) == 1
     middles = np.where(
@@ -117,7 +115,9 @@ def _tell_inside(shapes: gpd.GeoDataFrame, chosen: gpd.GeoDataFrame) -> None:
         shapely.line_interpolate_point(np.where(lines, other, None), 0.5, normalized=True),
         shapely.point_on_surface(other),
     )
-    there = shapely.within(middles, inner) & (shapely.area(other) < 0.5 * parcel.area)
+    # Its border may lie there as a line again, the same parcel as of another year.
+    off = shapely.distance(middles, parcel.boundary) > 0.01 * np.sqrt(parcel.area)
+    there = shapely.within(middles, parcel) & off & (shapely.area(other) < 0.5 * parcel.area)
     if not there.any():
         return
     count = int(there.sum())

@@ -201,8 +201,10 @@ def _say_obstacle(
     frame: gpd.GeoDataFrame, columns: Collection[str], others: frozenset[str]
 ) -> NDArray[np.bool_]:
     """Whether each shape's own texts name an obstacle, and nothing else that it may be."""
-    named = frame[[name for name in frame.columns if str(name).lower() in columns]]
-    texts = (" ".join(map(str, row)) for row in named.itertuples(index=False))
+    texts = [""] * len(frame)
+    for name in frame.columns:
+        if str(name).lower() in columns:
+            texts = [f"{text} {value}" for text, value in zip(texts, frame[name], strict=True)]
     words = [_words(text) for text in texts]
     return np.array([bool(w & _OBSTACLE_WORDS) and not w & others for w in words], bool)
 
