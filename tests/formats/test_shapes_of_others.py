@@ -159,3 +159,6 @@ def test_a_size_that_is_not_read_is_told(tmp_path, column):
     assert f"{column} of obstacles may say how wide they are" in told
     frame.rename(columns={column: "radius_m"}).to_file(tmp_path / "ditch.gpkg")
     assert "how wide" not in geofield(tmp_path, *around, "-o", "other.gpkg")
+    # A size of 0 is none, and the column is the one that is read.
+    frame.rename(columns={column: "radius_m"}).assign(radius_m=0.0).to_file(tmp_path / "ditch.gpkg")
+    assert "how wide" not in geofield(tmp_path, *around, "-o", "third.gpkg")

@@ -62,7 +62,7 @@ _NO_TREE = re.compile(
     r"huts?|poteaux?|puits|mares?|clôtures?|murs?|rochers?|fels(?:en)?)\b"
 )
 #: What columns are called that say how wide something is, but not as a radius in metres.
-_SIZE = re.compile("(?i)width|breite|largeur|diam|durchmesser|crown|krone|radius_?(?!m$|px$).")
+_SIZE = re.compile("(?i)width|breite|largeur|diam|durchmesser|crown|krone|radius(?!$|_?m$|_px$)")
 #: How geofield names lines in formats without numbers.
 _OUR_NAME = re.compile(r"Track (\d+)(?:-(\d+))?")
 #: Larger numbers are none that anybody counts with, nor exact in all programs.

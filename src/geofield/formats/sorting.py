@@ -188,7 +188,8 @@ def _parts(layer: RawLayer) -> list[_Part]:
         ("Polygon", _KIND_COLUMNS, _FIELD_WORDS),
         ("LineString", _KIND_COLUMNS | _NAME_COLUMNS, _GUIDANCE_WORDS),
     ):
-        stands |= (kinds == kind).to_numpy() & _say_obstacle(frame, columns, others)
+        mine = (kinds == kind).to_numpy()
+        stands[mine] = _say_obstacle(frame[mine], columns, others)
     return [
         _Part(layer.name, kind, frame[these], each)
         for kind in ("Polygon", "LineString", "Point")
